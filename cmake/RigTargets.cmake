@@ -1,0 +1,53 @@
+# The one way to declare a target: sources by hand, flags per target, never globally.
+
+set(RIG_WARNING_FLAGS -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Wold-style-cast -Wcast-align
+    -Woverloaded-virtual -Wdouble-promotion -Wimplicit-fallthrough)
+if(RIG_WARNINGS_AS_ERRORS)
+    list(APPEND RIG_WARNING_FLAGS -Werror)
+endif()
+
+function(rig_common_flags target)
+    target_include_directories(${target} PUBLIC ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/generated)
+    target_compile_options(${target} PRIVATE ${RIG_WARNING_FLAGS})
+    if(RIG_SANITIZE)
+        target_compile_options(${target} PUBLIC -fsanitize=${RIG_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+        target_link_options(${target} PUBLIC -fsanitize=${RIG_SANITIZE})
+    endif()
+endfunction()
+
+# rig_library(NAME SOURCES a.cpp b.cpp [DEPS x y])    one static library per folder
+function(rig_library name)
+    cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+    add_library(${name} STATIC ${ARG_SOURCES})
+    rig_common_flags(${name})
+    target_link_libraries(${name} PUBLIC ${ARG_DEPS})
+endfunction()
+
+# rig_core_library(...)    the same, with the arithmetic rules of core: no exceptions, no RTTI, no
+# contraction of a*b+c (a fused result differs between instruction sets), no Eigen vector kernels.
+function(rig_core_library name)
+    rig_library(${name} ${ARGN})
+    target_compile_options(${name} PRIVATE -fno-exceptions -fno-rtti -ffp-contract=off -fno-math-errno)
+    target_compile_definitions(${name} PUBLIC EIGEN_DONT_VECTORIZE EIGEN_DONT_PARALLELIZE)
+endfunction()
+
+# rig_program(NAME SOURCES ... [DEPS ...])    an executable into build/<preset>/bin
+function(rig_program name)
+    cmake_parse_arguments(ARG "" "" "SOURCES;DEPS" ${ARGN})
+    add_executable(${name} ${ARG_SOURCES})
+    rig_common_flags(${name})
+    target_link_libraries(${name} PRIVATE ${ARG_DEPS})
+endfunction()
+
+# rig_test(NAME SOURCES ... [DEPS ...] [LABELS ...] [TIMEOUT seconds])    a GoogleTest program, one ctest entry per
+# program (tests inside it are listed by --gtest_list_tests). A skip is reported by GoogleTest itself.
+function(rig_test name)
+    cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
+    rig_program(${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gtest GTest::gtest_main)
+    set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+    add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+    if(NOT ARG_TIMEOUT)
+        set(ARG_TIMEOUT 300)
+    endif()
+    set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+endfunction()

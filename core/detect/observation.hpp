@@ -1,0 +1,22 @@
+// What detection hands on: blobs that look like markers, without names.
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/bounded_vector.hpp"
+#include "core/limits.hpp"
+
+namespace rig {
+
+// One blob. Coordinates are raw (distorted) pixels, integers at pixel centres.
+struct Observation {
+    float x_px = 0.0F;
+    float y_px = 0.0F;
+    float diameter_px = 0.0F;  // of the disc with the blob's area
+    float contrast = 0.0F;     // |blob - background| / full scale, 0..1
+    float score = 0.0F;        // 0..1, how much it looks like a marker
+};
+
+using Observations = BoundedVector<Observation, kMaxObservations>;
+
+}  // namespace rig

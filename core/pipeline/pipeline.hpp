@@ -1,0 +1,114 @@
+// Puts the stages in order: a frame in, a FaceState and a FrameReport out. The only part of core that sees every stage.
+// Not for: time, threads, files, links; those belong to the programs.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "core/base/face_state.hpp"
+#include "core/base/linalg.hpp"
+#include "core/base/result.hpp"
+#include "core/detect/observation.hpp"
+#include "core/image/view.hpp"
+#include "core/pack/solve_pack.hpp"
+#include "core/track/named_markers.hpp"
+
+namespace rig {
+
+enum class MarkerPolarity : std::uint8_t { kAuto = 0, kDark = 1, kBright = 2 };
+
+enum class LossPolicy : std::uint8_t { kHold = 0, kDecay = 1 };
+
+struct PipelineConfig {
+    bool stabilise = true;       // false: input is already in the face frame
+    bool filter = true;          // smoothing and recovery blends; a temporal prior in the pack stays on either way
+    LossPolicy loss_policy = LossPolicy::kHold;
+    MarkerPolarity polarity = MarkerPolarity::kAuto;
+    double rate_hz = 60.0;
+};
+
+// One tick's images. images[c] is empty when camera c delivered nothing; status[c] then says why.
+struct FrameSet {
+    std::int64_t capture_us = 0;
+    std::array<ImageView, kMaxCameras> images{};
+    std::array<CameraStatus, kMaxCameras> status{};
+    std::uint8_t camera_count = 0;
+};
+
+// One tick's observations as detection reported them, for re-solving a recorded take.
+struct ObservationFrame {
+    std::int64_t capture_us = 0;
+    std::array<std::span<const Observation>, kMaxCameras> cameras{};
+    std::array<CameraStatus, kMaxCameras> status{};
+    std::uint8_t camera_count = 0;
+};
+
+// One tick of a labelled marker stream: entry k is marker k of the pack; a non-finite coordinate means not seen.
+struct LabelledFrame {
+    std::int64_t capture_us = 0;
+    std::span<const Vec3> positions_mm;
+};
+
+// One tick of an unlabelled stream: points in any order, ghosts among them; a non-finite point is an empty slot.
+struct PointFrame {
+    std::int64_t capture_us = 0;
+    std::span<const Vec3> positions_mm;
+};
+
+struct FrameReport {
+    // solve certificate
+    double kkt = 0.0;              // largest move of a projected Jacobi step; dimensionless
+    double objective_mm2 = 0.0;    // E at the answer
+    std::uint16_t iterations = 0;
+    std::uint16_t markers_used = 0;
+    double residual_rms_mm = 0.0;  // over the coordinates of the markers used
+    bool optimal = false;          // false: the iteration cap ended the solve at a feasible point
+    // identity
+    std::array<std::uint16_t, kMaxCameras> observations{};  // detected per camera
+    std::uint16_t markers_seen = 0;
+    std::uint16_t swaps_repaired = 0;
+    bool bootstrapped = false;     // identities were found anew in this frame
+    std::array<std::int16_t, kMaxPoints> labels{};  // PointFrame input: the marker each point was taken for, -1 none
+    // stabilised, completed markers in the face frame, mm; [marker_count]
+    std::array<Vec3, kMaxMarkers> face_markers_mm{};
+};
+
+enum class PipelineError : std::uint8_t { kPackLimits, kPackNumbers, kNoCameras };
+
+struct PipelineState;  // every stage's config, state and workspace
+
+// About 20 MB, all of it inside the object's one allocation made by the constructor; step() and idle() never allocate.
+// The pack's bytes must outlive it. One thread uses a pipeline.
+class Pipeline {
+  public:
+    Pipeline();
+    ~Pipeline();
+    Pipeline(const Pipeline&) = delete;
+    Pipeline& operator=(const Pipeline&) = delete;
+
+    // Validates everything once; on failure the pipeline stays in SAFE and every step yields the rest pose.
+    [[nodiscard]] Result<void, PipelineError> configure(const SolvePack& pack, const PipelineConfig& config);
+
+    // One tick each. `state` and `report` are overwritten. state.age_us and state.sequence: sequence is counted here,
+    // age is the caller's to fill when it encodes.
+    void step(const FrameSet& frame, FaceState& state, FrameReport& report);
+    void step(const ObservationFrame& frame, FaceState& state, FrameReport& report);
+    void step(const LabelledFrame& frame, FaceState& state, FrameReport& report);
+    void step(const PointFrame& frame, FaceState& state, FrameReport& report);
+    // A tick for which no input arrived at all.
+    void idle(std::int64_t now_us, FaceState& state, FrameReport& report);
+
+    // Forgets identities and slip; the next frames find them anew.
+    void reset_tracking();
+
+    // Of the last step, for recording and pictures.
+    [[nodiscard]] const Observations& observations(std::size_t camera) const;
+    [[nodiscard]] const NamedMarkers& named_markers() const;
+
+  private:
+    std::unique_ptr<PipelineState> state_;
+};
+
+}  // namespace rig

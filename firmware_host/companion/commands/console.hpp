@@ -1,0 +1,38 @@
+// What verbs say to a person: progress, errors, and whether anybody looks.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace rig::host {
+
+// True when standard error is a terminal: colours and moving bars are for people only.
+[[nodiscard]] bool is_interactive();
+
+// "headrig: <message>" on standard error.
+void print_error(std::string_view message);
+
+// A bar on standard error for anything over two seconds; on a pipe one plain line every ten percent.
+class Progress {
+  public:
+    Progress(std::string_view what, std::uint64_t total);
+    ~Progress();
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+    void update(std::uint64_t done, std::string_view note = {});
+
+  private:
+    std::string what_;
+    std::uint64_t total_;
+    std::int64_t started_ms_;
+    std::int64_t drawn_ms_ = 0;
+    int tenth_ = 0;
+    bool drawn_ = false;
+};
+
+// True after Ctrl-C or SIGTERM, once install_interrupt_handler() ran.
+void install_interrupt_handler();
+[[nodiscard]] bool interrupted();
+
+}  // namespace rig::host
