@@ -28,13 +28,15 @@ std::int64_t MonotonicClock::now_us() const {
     return static_cast<std::int64_t>(now.tv_sec) * kMicrosPerSecond + now.tv_nsec / 1000;
 }
 
-// A futex with an absolute CLOCK_MONOTONIC deadline: one wake reaches every sleeper, none is lost between the load and
-// the wait, and nothing has to be drained afterwards (a pipe or eventfd would need a reader elected among the sleepers).
+// A futex with an absolute CLOCK_MONOTONIC deadline: one wake reaches every sleeper, none is lost between the
+// load and the wait, and nothing has to be drained afterwards (a pipe or eventfd would need a reader elected
+// among the sleepers).
 void MonotonicClock::sleep_until_us(std::int64_t deadline_us) {
     const std::uint32_t seen = interrupts_.load(std::memory_order_acquire);
     while (interrupts_.load(std::memory_order_acquire) == seen && now_us() < deadline_us) {
         const timespec deadline = timespec_of(deadline_us);
-        syscall(SYS_futex, &interrupts_, FUTEX_WAIT_BITSET_PRIVATE, seen, &deadline, nullptr, FUTEX_BITSET_MATCH_ANY);
+        syscall(SYS_futex, &interrupts_, FUTEX_WAIT_BITSET_PRIVATE, seen, &deadline, nullptr,
+                FUTEX_BITSET_MATCH_ANY);
     }
 }
 

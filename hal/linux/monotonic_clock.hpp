@@ -17,7 +17,8 @@ class MonotonicClock final : public Clock {
 
   private:
     std::atomic<std::uint32_t> interrupts_{0};
-    static_assert(std::atomic<std::uint32_t>::is_always_lock_free, "interrupt() is called from signal handlers");
+    static_assert(std::atomic<std::uint32_t>::is_always_lock_free,
+                  "interrupt() is called from signal handlers");
 };
 
 }  // namespace rig

@@ -69,7 +69,7 @@ Result<void, StoreError> PosixStore::open() {
     }
     if (!opened.done()) return failure(StoreError::kOpen);
     os::Descriptor file(static_cast<int>(opened.value));
-    struct stat facts {};
+    struct stat facts{};
     if (!os::system_call([&] { return fstat(file.get(), &facts); }).done()) return failure(StoreError::kOpen);
     if (!S_ISREG(facts.st_mode) || static_cast<std::size_t>(facts.st_size) != size_bytes_) {
         return failure(StoreError::kOpen);
@@ -85,7 +85,8 @@ Result<void, StoreError> PosixStore::create() const {
     if (!opened.done()) return failure(StoreError::kOpen);
     const os::Descriptor file(static_cast<int>(opened.value));
     Result<void, StoreError> outcome = fill_erased(file.get(), 0, size_bytes_);
-    if (outcome && !os::system_call([&] { return fsync(file.get()); }).done()) outcome = failure(StoreError::kIo);
+    if (outcome && !os::system_call([&] { return fsync(file.get()); }).done())
+        outcome = failure(StoreError::kIo);
     if (outcome && !os::system_call([&] { return rename(temporary.c_str(), path_.c_str()); }).done()) {
         outcome = failure(StoreError::kOpen);
     }

@@ -8,14 +8,14 @@
 
 namespace rig {
 
-// After a sync() that failed the kernel may have dropped the changes and forgotten that it did, so every later call is
-// kIo until open() has read the truth from the disk again.
+// After a sync() that failed the kernel may have dropped the changes and forgotten that it did, so every
+// later call is kIo until open() has read the truth from the disk again.
 class PosixStore final : public Store {
   public:
     PosixStore(std::string path, std::size_t size_bytes) : path_(std::move(path)), size_bytes_(size_bytes) {}
 
-    // Creates the file, all 0xFF, if there is none: written beside it, synced, renamed and the folder synced, so that
-    // a power cut leaves either no file or a whole one. kOpen when a file of another size is there.
+    // Creates the file, all 0xFF, if there is none: written beside it, synced, renamed and the folder synced,
+    // so that a power cut leaves either no file or a whole one. kOpen when a file of another size is there.
     [[nodiscard]] Result<void, StoreError> open();
     void close() { file_.reset(); }
 

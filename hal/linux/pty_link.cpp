@@ -32,14 +32,14 @@ bool PtyLink::open_pair() {
     if (!os::system_call([&] { return unlockpt(master); }).done()) return false;
     if (ptsname_r(master, slave_path_.data(), slave_path_.size()) != 0) return false;
     if (!os::make_raw(master, os::kKeepRate)) return false;
-    // A slave that was never opened accepts and keeps bytes as if somebody were there. Only after a first close does
-    // the master see a hang-up, so the link makes that close itself.
+    // A slave that was never opened accepts and keeps bytes as if somebody were there. Only after a first
+    // close does the master see a hang-up, so the link makes that close itself.
     return discard_leftovers();
 }
 
 bool PtyLink::discard_leftovers() const {
-    const os::SystemResult opened =
-        os::system_call([&] { return ::open(slave_path_.data(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC); });
+    const os::SystemResult opened = os::system_call(
+        [&] { return ::open(slave_path_.data(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC); });
     if (!opened.done()) return false;
     const os::Descriptor slave(static_cast<int>(opened.value));
     return os::discard_input(slave.get());
@@ -47,7 +47,7 @@ bool PtyLink::discard_leftovers() const {
 
 // A symlink is replaced by rename, so that a reader finds the old one or the new one and never none.
 bool PtyLink::publish_symlink() const {
-    struct stat existing {};
+    struct stat existing{};
     const bool present = os::system_call([&] { return lstat(symlink_path_.c_str(), &existing); }).done();
     if (present && !S_ISLNK(existing.st_mode)) return false;
     const std::string temporary = symlink_path_ + ".new";
@@ -62,8 +62,8 @@ bool PtyLink::publish_symlink() const {
 bool PtyLink::owns_symlink() const {
     if (symlink_path_.empty() || slave_path_[0] == '\0') return false;
     std::array<char, 64> target{};
-    const os::SystemResult length = os::system_call(
-        [&] { return readlink(symlink_path_.c_str(), target.data(), target.size() - 1); });
+    const os::SystemResult length =
+        os::system_call([&] { return readlink(symlink_path_.c_str(), target.data(), target.size() - 1); });
     return length.done() && std::strcmp(target.data(), slave_path_.data()) == 0;
 }
 
@@ -74,9 +74,9 @@ void PtyLink::close() {
     leftovers_possible_ = false;
 }
 
-// POLLHUP on the master is how Linux says that no slave is open. A hang-up here is therefore "nobody there", not a
-// dead device. A reader that goes and comes between two calls is not noticed; it may meet bytes that are as old as one
-// tick, which the framing tells from new ones by their sequence.
+// POLLHUP on the master is how Linux says that no slave is open. A hang-up here is therefore "nobody there",
+// not a dead device. A reader that goes and comes between two calls is not noticed; it may meet bytes that
+// are as old as one tick, which the framing tells from new ones by their sequence.
 bool PtyLink::slave_is_open() {
     pollfd state{master_.get(), 0, 0};
     const os::SystemResult polled = os::system_call([&] { return poll(&state, 1, 0); });

@@ -1,4 +1,5 @@
-// A pseudo-terminal: a serial port without hardware. The other side opens the slave, by its own name or by a symlink.
+// A pseudo-terminal: a serial port without hardware. The other side opens the slave, by its own name or by a
+// symlink.
 #pragma once
 
 #include <array>
@@ -9,10 +10,10 @@
 
 namespace rig {
 
-// The slave may be opened late, closed and opened again; this link stays. While nobody has it open, write() takes 0
-// bytes (a reader that comes later shall not find old bytes) and read() hands out what the last reader still wrote,
-// then 0. Bytes that a reader left unread are dropped as soon as write() or read() notices that it has gone.
-// The link is never kClosed by what readers do.
+// The slave may be opened late, closed and opened again; this link stays. While nobody has it open, write()
+// takes 0 bytes (a reader that comes later shall not find old bytes) and read() hands out what the last
+// reader still wrote, then 0. Bytes that a reader left unread are dropped as soon as write() or read()
+// notices that it has gone. The link is never kClosed by what readers do.
 class PtyLink final : public ByteLink {
   public:
     // `symlink_path` may be empty. An existing symlink there is replaced; anything else there refuses open().

@@ -1,6 +1,7 @@
 #include "hal/linux/raw_terminal.hpp"
 
-// The kernel's termios2 takes any bit rate; glibc's <termios.h> knows only a table and cannot share a file with it.
+// The kernel's termios2 takes any bit rate; glibc's <termios.h> knows only a table and cannot share a file
+// with it.
 #include <asm/termbits.h>
 #include <sys/ioctl.h>
 

@@ -1,5 +1,6 @@
-// The one way from here to the kernel. Retries what only a signal interrupted, sorts every other outcome, and keeps
-// errno inside hal/linux. Not for close(): Linux has released the descriptor even when close() reports EINTR.
+// The one way from here to the kernel. Retries what only a signal interrupted, sorts every other outcome, and
+// keeps errno inside hal/linux. Not for close(): Linux has released the descriptor even when close() reports
+// EINTR.
 #pragma once
 
 #include <cerrno>
@@ -24,7 +25,8 @@ struct SystemResult {
     [[nodiscard]] bool failed() const { return outcome == Outcome::kFailed; }
 };
 
-// `call` returns -1 and sets errno on failure. A call that a signal interrupts for ever is cut off after 1000 tries.
+// `call` returns -1 and sets errno on failure. A call that a signal interrupts for ever is cut off after 1000
+// tries.
 template <class Call>
 [[nodiscard]] SystemResult system_call(Call call, std::initializer_list<int> tolerated = {}) {
     SystemResult result;

@@ -1,4 +1,5 @@
-// The service manager as watchdog: the sd_notify protocol, which is one datagram per message to $NOTIFY_SOCKET.
+// The service manager as watchdog: the sd_notify protocol, which is one datagram per message to
+// $NOTIFY_SOCKET.
 #pragma once
 
 #include <array>
@@ -10,8 +11,9 @@
 
 namespace rig {
 
-// Without a service manager every call does nothing and timeout_us() is 0. A message that cannot be sent at once is
-// dropped: a manager that does not read must not stop the rig, and a missed feed is repeated by the next tick.
+// Without a service manager every call does nothing and timeout_us() is 0. A message that cannot be sent at
+// once is dropped: a manager that does not read must not stop the rig, and a missed feed is repeated by the
+// next tick.
 class SystemdWatchdog final : public Watchdog {
   public:
     // `notify_socket`: a path, or a name that starts with '@' for the abstract namespace; empty for none.

@@ -10,9 +10,8 @@ namespace rig {
 
 Result<void, LinkError> TtyLink::open() {
     close();
-    const os::SystemResult opened = os::system_call([&] {
-        return ::open(path_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    });
+    const os::SystemResult opened =
+        os::system_call([&] { return ::open(path_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC); });
     if (!opened.done()) return failure(LinkError::kOpen);
     os::Descriptor port(static_cast<int>(opened.value));
     if (!os::make_raw(port.get(), baud_) || !os::discard_input(port.get())) return failure(LinkError::kOpen);
@@ -41,8 +40,8 @@ Result<std::size_t, LinkError> TtyLink::read(MutableByteSpan into) {
     return static_cast<std::size_t>(got.value);
 }
 
-// kClosed stays until open(), so the descriptor goes at once: a node that comes back gets its old name only when the
-// last holder has let go.
+// kClosed stays until open(), so the descriptor goes at once: a node that comes back gets its old name only
+// when the last holder has let go.
 LinkError TtyLink::lost(int error_number) {
     const bool gone = error_number == EIO || error_number == ENODEV || error_number == ENXIO ||
                       error_number == EBADF || error_number == ESHUTDOWN;

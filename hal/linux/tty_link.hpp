@@ -8,8 +8,8 @@
 
 namespace rig {
 
-// Any rate the driver can divide; 115200 to 3000000 baud are what the rig uses. EIO, ENODEV, ENXIO and hang-up become
-// kClosed: the device went away and open() tries again.
+// Any rate the driver can divide; 115200 to 3000000 baud are what the rig uses. EIO, ENODEV, ENXIO and
+// hang-up become kClosed: the device went away and open() tries again.
 class TtyLink final : public ByteLink {
   public:
     TtyLink(std::string path, int baud) : path_(std::move(path)), baud_(baud) {}

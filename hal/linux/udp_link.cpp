@@ -67,7 +67,9 @@ Result<UdpAddress, LinkError> resolve_udp(const std::string& host, std::uint16_t
 
 Result<void, LinkError> UdpLink::open() {
     close();
-    const int family = !fixed_peer_.empty() ? family_of(fixed_peer_) : !local_.empty() ? family_of(local_) : AF_INET;
+    const int family = !fixed_peer_.empty() ? family_of(fixed_peer_)
+                       : !local_.empty()    ? family_of(local_)
+                                            : AF_INET;
     const os::SystemResult made =
         os::system_call([&] { return ::socket(family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0); });
     if (!made.done()) return failure(LinkError::kOpen);
@@ -80,8 +82,9 @@ Result<void, LinkError> UdpLink::open() {
     }
     if (!fixed_peer_.empty()) {
         const sockaddr_storage raw = sockaddr_of(fixed_peer_);
-        const bool connected =
-            os::system_call([&] { return connect(socket.get(), generic(raw), fixed_peer_.length_bytes); }).done();
+        const bool connected = os::system_call([&] {
+                                   return connect(socket.get(), generic(raw), fixed_peer_.length_bytes);
+                               }).done();
         if (!connected) return failure(LinkError::kOpen);
     }
     socket_ = std::move(socket);
@@ -115,7 +118,8 @@ Result<std::size_t, LinkError> UdpLink::read(MutableByteSpan into) {
         socklen_t sender_length = sizeof(sender);
         const os::SystemResult got = os::system_call(
             [&] {
-                return recvfrom(socket_.get(), into.data(), into.size(), MSG_TRUNC, generic(sender), &sender_length);
+                return recvfrom(socket_.get(), into.data(), into.size(), MSG_TRUNC, generic(sender),
+                                &sender_length);
             },
             {EAGAIN, ECONNREFUSED, ENETUNREACH, EHOSTUNREACH, ENETDOWN, EHOSTDOWN});
         // A pending ICMP report is taken away by the call that returned it; datagrams may wait behind it.
@@ -139,7 +143,8 @@ std::uint16_t UdpLink::local_port() const {
     socklen_t length = sizeof(raw);
     if (!os::system_call([&] { return getsockname(socket_.get(), generic(raw), &length); }).done()) return 0;
     std::uint16_t port = 0;  // at the same offset in sockaddr_in and sockaddr_in6
-    std::memcpy(&port, reinterpret_cast<const std::byte*>(&raw) + offsetof(sockaddr_in, sin_port), sizeof(port));
+    std::memcpy(&port, reinterpret_cast<const std::byte*>(&raw) + offsetof(sockaddr_in, sin_port),
+                sizeof(port));
     return ntohs(port);
 }
 

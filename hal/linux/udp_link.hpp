@@ -21,9 +21,10 @@ struct UdpAddress {
 // May ask a name server and block: for start-up, before any thread of the rig runs.
 [[nodiscard]] Result<UdpAddress, LinkError> resolve_udp(const std::string& host, std::uint16_t port);
 
-// `local` empty: any free port. `peer` given: sends there and hears only it. `peer` empty: answers whoever was heard
-// last, and writes take 0 bytes until somebody was heard. A peer that is not there (refused, unreachable) and a full
-// send queue are 0 bytes too. A datagram longer than the reader's span is dropped whole and counted.
+// `local` empty: any free port. `peer` given: sends there and hears only it. `peer` empty: answers whoever
+// was heard last, and writes take 0 bytes until somebody was heard. A peer that is not there (refused,
+// unreachable) and a full send queue are 0 bytes too. A datagram longer than the reader's span is dropped
+// whole and counted.
 class UdpLink final : public ByteLink {
   public:
     UdpLink(const UdpAddress& local, const UdpAddress& peer) : local_(local), fixed_peer_(peer) {}
