@@ -14,18 +14,23 @@ inline constexpr std::size_t kMaxShapes = 256;        // artists' rigs reach 200
 inline constexpr std::size_t kMaxRows = 3 * kMaxMarkers;
 inline constexpr std::size_t kMaxObservations = 256;  // per camera and frame: every marker twice
 inline constexpr std::size_t kMaxPoints = 256;        // unlabelled 3D points of one frame: every marker twice
-inline constexpr std::size_t kMaxModes = 32;          // shape-space dimensions of the tracker
+inline constexpr std::size_t kMaxModes = 48;         // shape-space dimensions of tracker and stabiliser
 inline constexpr std::size_t kMaxRbfCentres = 256;    // reference frames of one pack; the sources use 100
 inline constexpr std::size_t kMaxRbfDimensions = 32;  // principal components kept; the sources use 4 to 20
 inline constexpr std::size_t kMaxImageWidth = 1920;   // px
 inline constexpr std::size_t kMaxImageHeight = 1200;  // px
 inline constexpr std::size_t kMaxNameBytes = 63;      // of one shape or marker, UTF-8
+inline constexpr std::size_t kMaxPackBoards = 16;     // boards that one pack names as compatible
 inline constexpr std::size_t kMaxPackBytes = std::size_t{64} << 20;
 inline constexpr std::size_t kMaxManifestBytes = std::size_t{16} << 10;  // one read, before anything is trusted
 inline constexpr std::size_t kMaxWireFrameBytes = 655;                   // on the wire, delimiters included
 
 static_assert(kMaxObservations >= 2 * kMaxMarkers);
 static_assert(kMaxPoints >= 2 * kMaxMarkers);
+// the largest pack that can be written fits: basis, RBF basis, centres, weights as float32
+static_assert(4 * (kMaxRows * kMaxShapes + kMaxRbfDimensions * kMaxRows + kMaxRbfCentres * kMaxRbfDimensions +
+                   kMaxRbfCentres * kMaxShapes) <=
+              kMaxPackBytes / 2);
 static_assert(kMaxModes <= kMaxShapes);
 
 }  // namespace rig
