@@ -114,7 +114,7 @@ bool WorldClient::Connection::receive_hello(os::Descriptor& memory) {
         if (!memory.is_open()) memory = std::move(descriptor);
         received += static_cast<std::size_t>(got.value);
     }
-    hello_ = load<WorldHello>(bytes, 0);
+    hello_ = rig::load<WorldHello>(bytes, 0);
     struct stat facts{};
     if (!memory.is_open() || !os::system_call([&] { return fstat(memory.get(), &facts); }).done())
         return false;
@@ -183,7 +183,7 @@ void WorldClient::Connection::receive_bytes() {
 
 bool WorldClient::Connection::accept_message(const Lock&) {
     if (is_down() || inbox_bytes_ < sizeof(WorldMessage)) return false;
-    const auto message = load<WorldMessage>(inbox_, 0);
+    const auto message = rig::load<WorldMessage>(inbox_, 0);
     inbox_bytes_ -= sizeof(WorldMessage);
     std::memmove(inbox_.data(), inbox_.data() + sizeof(WorldMessage), inbox_bytes_);
     if (const char* fault = ledger_->accept(message)) go_down(fault);

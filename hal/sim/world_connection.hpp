@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 
+#include "core/base/bytes.hpp"
 #include "hal/linux/descriptor.hpp"
 #include "hal/linux/monotonic_clock.hpp"
 #include "hal/sim/world_client.hpp"
