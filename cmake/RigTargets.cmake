@@ -13,6 +13,9 @@ function(rig_common_flags target)
         target_compile_options(${target} PUBLIC -fsanitize=${RIG_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
         target_link_options(${target} PUBLIC -fsanitize=${RIG_SANITIZE})
     endif()
+    if(RIG_BUILD_FUZZERS)
+        target_compile_options(${target} PRIVATE -fsanitize=fuzzer-no-link)  # coverage for libFuzzer to follow
+    endif()
 endfunction()
 
 # rig_library(NAME SOURCES a.cpp b.cpp [DEPS x y])    one static library per folder
