@@ -13,15 +13,15 @@ namespace rig::host {
 namespace {
 
 // Reflectances in the near infrared and green, where such cameras look; eye-balled against the reference pictures.
-constexpr double kSkin = 0.62;
-constexpr double kLip = 0.46;
-constexpr double kBrow = 0.30;
-constexpr double kTeeth = 0.80;
-constexpr double kGums = 0.40;
-constexpr double kEyeWhite = 0.75;
-constexpr double kIris = 0.28;
-constexpr double kPupil = 0.04;
-constexpr double kNeck = 0.42;
+constexpr double kSkinAlbedo = 0.62;
+constexpr double kLipAlbedo = 0.46;
+constexpr double kBrowAlbedo = 0.30;
+constexpr double kTeethAlbedo = 0.80;
+constexpr double kGumsAlbedo = 0.40;
+constexpr double kEyeWhiteAlbedo = 0.75;
+constexpr double kIrisAlbedo = 0.28;
+constexpr double kPupilAlbedo = 0.04;
+constexpr double kNeckAlbedo = 0.42;
 constexpr double kIrisRadius_mm = 5.9;
 constexpr double kPupilRadius_mm = 2.2;
 
@@ -142,11 +142,11 @@ std::vector<Vec3d> part_centres(const Rig& rig, const std::vector<Vec3d>& rest) 
 }
 
 double eye_albedo(const Vec3d& p, const Vec3d& centre) {
-    if (p[2] < centre[2]) return kEyeWhite;
+    if (p[2] < centre[2]) return kEyeWhiteAlbedo;
     const double off_axis = std::hypot(p[0] - centre[0], p[1] - centre[1]);
     const double iris = bump(off_axis, kIrisRadius_mm - 0.4, kIrisRadius_mm + 0.4);
     const double pupil = bump(off_axis, kPupilRadius_mm - 0.4, kPupilRadius_mm + 0.4);
-    return kEyeWhite + iris * (kIris - kEyeWhite) + pupil * (kPupil - kIris);
+    return kEyeWhiteAlbedo + iris * (kIrisAlbedo - kEyeWhiteAlbedo) + pupil * (kPupilAlbedo - kIrisAlbedo);
 }
 
 // Depth of the head seen from far away along one direction.
@@ -234,7 +234,7 @@ SkinTone skin_tone(const Rig& rig, std::uint64_t seed) {
     SkinTone tone{std::vector<float>(rest.size()), std::vector<float>(rest.size())};
     for (std::size_t v = 0; v < rest.size(); ++v) {
         const Vec3d& p = rest[v];
-        double albedo = kSkin;
+        double albedo = kSkinAlbedo;
         double gloss = 0.25;
         const double blotch = 1.0 + 0.10 * value_noise(seed, p, 22.0) + 0.07 * value_noise(seed + 1, p, 8.0) +
                               0.06 * value_noise(seed + 2, p, 3.0);
@@ -242,16 +242,16 @@ SkinTone skin_tone(const Rig& rig, std::uint64_t seed) {
             case Surface::kSkin: {
                 const double lip = lip_at(seam, p);
                 const double brow = brow_at(seed, p);
-                albedo = (kSkin + lip * (kLip - kSkin)) * blotch;
-                albedo += brow * (kBrow - albedo);
+                albedo = (kSkinAlbedo + lip * (kLipAlbedo - kSkinAlbedo)) * blotch;
+                albedo += brow * (kBrowAlbedo - albedo);
                 gloss += 0.25 * lip;
                 break;
             }
-            case Surface::kNeck: albedo = kNeck * blotch; gloss = 0.1; break;
+            case Surface::kNeck: albedo = kNeckAlbedo * blotch; gloss = 0.1; break;
             case Surface::kEyeWhite:
             case Surface::kIris: albedo = eye_albedo(p, centres[part[v]]); gloss = 1.0; break;
-            case Surface::kTeeth: albedo = kTeeth; gloss = 0.6; break;
-            case Surface::kGums: albedo = kGums * blotch; gloss = 0.6; break;
+            case Surface::kTeeth: albedo = kTeethAlbedo; gloss = 0.6; break;
+            case Surface::kGums: albedo = kGumsAlbedo * blotch; gloss = 0.6; break;
         }
         tone.albedo[v] = static_cast<float>(std::clamp(albedo, 0.0, 1.0));
         tone.gloss[v] = static_cast<float>(gloss);
