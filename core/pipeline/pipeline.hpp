@@ -17,8 +17,6 @@
 
 namespace rig {
 
-enum class MarkerPolarity : std::uint8_t { kAuto = 0, kDark = 1, kBright = 2 };
-
 enum class LossPolicy : std::uint8_t { kHold = 0, kDecay = 1 };
 
 struct PipelineConfig {

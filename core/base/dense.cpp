@@ -1,0 +1,156 @@
+#include "core/base/dense.hpp"
+
+#include <cmath>
+
+#include "core/base/check.hpp"
+
+namespace rig {
+
+namespace {
+
+constexpr int kMaxJacobiSweeps = 30;
+
+void rotate_rows_and_columns(double* a, std::size_t n, std::size_t stride, std::size_t p, std::size_t q, double c,
+                             double s) {
+    for (std::size_t k = 0; k < n; ++k) {
+        const double akp = a[k * stride + p];
+        const double akq = a[k * stride + q];
+        a[k * stride + p] = c * akp - s * akq;
+        a[k * stride + q] = s * akp + c * akq;
+    }
+    for (std::size_t k = 0; k < n; ++k) {
+        const double apk = a[p * stride + k];
+        const double aqk = a[q * stride + k];
+        a[p * stride + k] = c * apk - s * aqk;
+        a[q * stride + k] = s * apk + c * aqk;
+    }
+}
+
+void rotate_columns(double* v, std::size_t n, std::size_t stride, std::size_t p, std::size_t q, double c, double s) {
+    for (std::size_t k = 0; k < n; ++k) {
+        const double vkp = v[k * stride + p];
+        const double vkq = v[k * stride + q];
+        v[k * stride + p] = c * vkp - s * vkq;
+        v[k * stride + q] = s * vkp + c * vkq;
+    }
+}
+
+// One sweep over all pairs; returns the sum of squares it met off the diagonal.
+double jacobi_sweep(double* a, std::size_t n, std::size_t stride, double* vectors) {
+    double off = 0.0;
+    for (std::size_t p = 0; p + 1 < n; ++p) {
+        for (std::size_t q = p + 1; q < n; ++q) {
+            const double apq = a[p * stride + q];
+            off += apq * apq;
+            if (apq == 0.0) continue;
+            const double theta = (a[q * stride + q] - a[p * stride + p]) / (2.0 * apq);
+            const double sign = theta >= 0.0 ? 1.0 : -1.0;
+            const double t = sign / (sign * theta + std::sqrt(theta * theta + 1.0));
+            const double c = 1.0 / std::sqrt(t * t + 1.0);
+            rotate_rows_and_columns(a, n, stride, p, q, c, t * c);
+            rotate_columns(vectors, n, stride, p, q, c, t * c);
+        }
+    }
+    return off;
+}
+
+void sort_falling(double* values, double* vectors, std::size_t n, std::size_t stride) {
+    for (std::size_t i = 0; i < n; ++i) {
+        std::size_t best = i;
+        for (std::size_t j = i + 1; j < n; ++j) {
+            if (values[j] > values[best]) best = j;
+        }
+        if (best == i) continue;
+        const double value = values[i];
+        values[i] = values[best];
+        values[best] = value;
+        for (std::size_t k = 0; k < n; ++k) {
+            const double entry = vectors[k * stride + i];
+            vectors[k * stride + i] = vectors[k * stride + best];
+            vectors[k * stride + best] = entry;
+        }
+    }
+}
+
+}  // namespace
+
+double dot(const double* a, const double* b, std::size_t n) {
+    double s0 = 0.0;
+    double s1 = 0.0;
+    double s2 = 0.0;
+    double s3 = 0.0;
+    std::size_t i = 0;
+    for (; i + 4 <= n; i += 4) {
+        s0 += a[i] * b[i];
+        s1 += a[i + 1] * b[i + 1];
+        s2 += a[i + 2] * b[i + 2];
+        s3 += a[i + 3] * b[i + 3];
+    }
+    for (; i < n; ++i) s0 += a[i] * b[i];
+    return (s0 + s1) + (s2 + s3);
+}
+
+void add_scaled(double* y, double alpha, const double* x, std::size_t n) {
+    for (std::size_t i = 0; i < n; ++i) y[i] += alpha * x[i];
+}
+
+bool cholesky(const double* a, double* l, std::size_t n, std::size_t stride, double floor) {
+    double largest = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (a[i * stride + i] > largest) largest = a[i * stride + i];
+    }
+    const double smallest_pivot = floor * largest;
+    for (std::size_t i = 0; i < n; ++i) {
+        double* li = l + i * stride;
+        for (std::size_t j = 0; j < i; ++j) {
+            const double* lj = l + j * stride;
+            li[j] = (a[i * stride + j] - dot(li, lj, j)) / lj[j];
+        }
+        const double pivot = a[i * stride + i] - dot(li, li, i);
+        if (!(pivot > smallest_pivot)) return false;  // also refuses NaN
+        li[i] = std::sqrt(pivot);
+    }
+    return true;
+}
+
+void solve_lower(const double* l, std::size_t n, std::size_t stride, double* x) {
+    for (std::size_t i = 0; i < n; ++i) x[i] = (x[i] - dot(l + i * stride, x, i)) / l[i * stride + i];
+}
+
+void solve_lower_transposed(const double* l, std::size_t n, std::size_t stride, double* x) {
+    for (std::size_t i = n; i-- > 0;) {
+        x[i] /= l[i * stride + i];
+        add_scaled(x, -x[i], l + i * stride, i);
+    }
+}
+
+void inverse_diagonal(const double* l, std::size_t n, std::size_t stride, double* diagonal, double* scratch) {
+    // Entry i of the diagonal is the squared length of column i of L^-1.
+    for (std::size_t column = 0; column < n; ++column) {
+        double sum = 0.0;
+        for (std::size_t i = column; i < n; ++i) {
+            const double unit = i == column ? 1.0 : 0.0;
+            scratch[i] = (unit - dot(l + i * stride + column, scratch + column, i - column)) / l[i * stride + i];
+            sum += scratch[i] * scratch[i];
+        }
+        diagonal[column] = sum;
+    }
+}
+
+void symmetric_eigen(double* a, std::size_t n, std::size_t stride, double* values, double* vectors) {
+    RIG_CHECK(stride >= n);
+    double total = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t j = 0; j < n; ++j) {
+            vectors[i * stride + j] = i == j ? 1.0 : 0.0;
+            total += a[i * stride + j] * a[i * stride + j];
+        }
+    }
+    for (int sweep = 0; sweep < kMaxJacobiSweeps; ++sweep) {
+        if (jacobi_sweep(a, n, stride, vectors) <= 1e-30 * total) break;
+    }
+    for (std::size_t i = 0; i < n; ++i) values[i] = a[i * stride + i];
+    sort_falling(values, vectors, n, stride);
+}
+
+}  // namespace rig

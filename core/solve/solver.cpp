@@ -1,0 +1,166 @@
+#include "core/solve/solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/dense.hpp"
+#include "core/base/math.hpp"
+
+namespace rig {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::size_t fill_input(const SolverConfig& config, const StabiliserOutput& stabilised, SolverWorkspace& w) {
+    const double s2 = static_cast<double>(config.pack.noise_mm) * static_cast<double>(config.pack.noise_mm);
+    std::size_t seen = 0;
+    for (std::size_t k = 0; k < config.pack.marker_count; ++k) {
+        const StabilisedMarker& marker = stabilised.markers[k];
+        w.positions_mm[k] = marker.position_mm;
+        w.weights[k] = Mat3::Zero();
+        if (!marker.seen) continue;
+        ++seen;
+        w.weights[k] = s2 * marker.information;
+        // A 3D stream's marker comes back from the rotation within rounding of I: say so, it is the fast case.
+        if ((w.weights[k] - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-6) w.weights[k] = Mat3::Identity();
+    }
+    return seen;
+}
+
+void fill_bounds(const SolverConfig& config, SolverWorkspace& w) {
+    for (std::size_t i = 0; i < config.pack.shape_count; ++i) {
+        w.low[i] = static_cast<double>(config.pack.weight_low[i]);
+        w.high[i] = static_cast<double>(config.pack.weight_high[i]);
+        if (config.pack.solver == SolverKind::kLeastSquares) {
+            w.low[i] = -kInfinity;
+            w.high[i] = kInfinity;
+        } else if (config.pack.solver == SolverKind::kNonNegative) {
+            w.low[i] = 0.0;
+            w.high[i] = kInfinity;
+        }
+    }
+}
+
+double gamma_scale(const SolverConfig& config, const SolverState& state, std::int64_t capture_us) {
+    if (!state.has_previous) return 0.0;
+    const double gap_s = static_cast<double>(capture_us - state.previous_us) * 1e-6;
+    if (gap_s > config.forget_s || gap_s < 0.0) return 0.0;
+    return 1.0 / std::max(1.0, gap_s * config.rate_hz);
+}
+
+// Weights of the markers seen: P = (B^T V B / s^2 + P0^-1)^-1, without the active set, so that hiding a marker can only
+// lower a confidence.
+void update_confidence(const SolverConfig& config, const StabiliserOutput& stabilised, SolverState& state,
+                       SolverWorkspace& w) {
+    const SolvePack& pack = config.pack;
+    const std::size_t n = pack.shape_count;
+    bool same = state.has_confidence;
+    for (std::size_t k = 0; k < pack.marker_count; ++k) {
+        const std::uint8_t seen = stabilised.markers[k].seen ? 1 : 0;
+        same = same && state.pattern[k] == seen;
+        state.pattern[k] = seen;
+    }
+    if (same) return;
+    const double s2 = static_cast<double>(pack.noise_mm) * static_cast<double>(pack.noise_mm);
+    for (std::size_t i = 0; i < n; ++i) {
+        const double sigma = static_cast<double>(pack.prior_sigma[i]);
+        for (std::size_t j = 0; j < i; ++j) {
+            w.posterior[i * kMaxShapes + j] = w.equations.hessian[i * kMaxShapes + j] / s2;
+        }
+        w.posterior[i * kMaxShapes + i] = w.equations.data_diagonal[i] / s2 + 1.0 / (sigma * sigma);
+    }
+    state.confidence.fill(0.0F);
+    if (cholesky(w.posterior.data(), w.posterior.data(), n, kMaxShapes)) {
+        inverse_diagonal(w.posterior.data(), n, kMaxShapes, w.diagonal.data(), w.scratch.data());
+        for (std::size_t i = 0; i < n; ++i) {
+            const double left = std::sqrt(w.diagonal[i]) / static_cast<double>(pack.prior_sigma[i]);
+            state.confidence[i] = static_cast<float>(std::clamp(1.0 - left, 0.0, 1.0));
+        }
+    }
+    state.has_confidence = true;
+}
+
+void run_quadratic(const SolverConfig& config, SolverState& state, SolverWorkspace& w, SolverOutput& output,
+                   SolverReport& report) {
+    const std::size_t n = config.pack.shape_count;
+    fill_bounds(config, w);
+    const BoxQpProblem problem{n, w.equations.hessian, w.equations.linear, w.low, w.high};
+    for (std::size_t i = 0; i < n; ++i) output.weights[i] = state.previous[i];
+    const BoxQpReport qp = solve_box_qp(problem, config.qp, state.qp, w.qp, {output.weights.data(), n});
+    report.optimal = qp.optimal;
+    report.kkt = qp.kkt;
+    report.iterations = qp.iterations;
+    report.objective_mm2 = 2.0 * qp.objective + w.equations.constant_mm2;
+}
+
+void run_rbf(const SolverConfig& config, const InferenceOutput& completed, SolverWorkspace& w, SolverOutput& output,
+             SolverReport& report) {
+    for (std::size_t k = 0; k < config.pack.marker_count; ++k) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            w.flat_mm[3 * k + axis] = static_cast<float>(completed.position_mm[k][static_cast<Eigen::Index>(axis)]);
+        }
+    }
+    const RbfReport rbf = evaluate_rbf(config.pack, {w.flat_mm.data(), 3U * config.pack.marker_count}, w.rbf,
+                                       {output.weights.data(), config.pack.shape_count});
+    report.optimal = true;
+    report.hull_distance = rbf.nearest_widths;
+}
+
+}  // namespace
+
+void configure_solver(const SolvePack& pack, double rate_hz, SolverConfig& config) {
+    config.pack = pack;
+    config.rate_hz = rate_hz;
+    build_normal_tables(pack, config.tables);
+}
+
+void reset_solver(SolverState& state) {
+    state = SolverState{};
+}
+
+void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const InferenceOutput& completed,
+           std::int64_t capture_us, SolverState& state, SolverWorkspace& w, SolverOutput& output,
+           SolverReport& report) {
+    report = SolverReport{};
+    const SolvePack& pack = config.pack;
+    const std::size_t n = pack.shape_count;
+    if (!state.has_previous) {
+        for (std::size_t i = 0; i < n; ++i) {
+            state.previous[i] =
+                std::clamp(0.0, static_cast<double>(pack.weight_low[i]), static_cast<double>(pack.weight_high[i]));
+        }
+    }
+    const std::size_t seen = fill_input(config, stabilised, w);
+    NormalInput input;
+    input.positions_mm = {w.positions_mm.data(), pack.marker_count};
+    input.weights = {w.weights.data(), pack.marker_count};
+    input.previous = {state.previous.data(), n};
+    input.gamma_scale = gamma_scale(config, state, capture_us);
+    build_normal_equations(pack, config.tables, input, w.equations);
+    report.markers_used = static_cast<std::uint16_t>(w.equations.markers_used);
+    update_confidence(config, stabilised, state, w);
+    output.confidence = state.confidence;
+    if (seen < kMinMarkers) {
+        output.weights = state.previous;
+        return;
+    }
+    if (pack.solver == SolverKind::kRbf) {
+        run_rbf(config, completed, w, output, report);
+    } else {
+        run_quadratic(config, state, w, output, report);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!is_finite(output.weights[i])) output.weights[i] = state.previous[i];
+        output.weights[i] = std::clamp(output.weights[i], static_cast<double>(pack.weight_low[i]),
+                                       static_cast<double>(pack.weight_high[i]));
+    }
+    report.residual_rms_mm = residual_rms_mm(pack, config.tables, input, {output.weights.data(), n});
+    report.solved = true;
+    state.previous = output.weights;
+    state.previous_us = capture_us;
+    state.has_previous = true;
+}
+
+}  // namespace rig

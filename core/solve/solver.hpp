@@ -1,0 +1,75 @@
+// The solve stage: markers in the face frame -> weights, with a certificate and a confidence for each weight. Chooses
+// the solver that the pack names; the mathematics of each is in its own file.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "core/geometry/shape_model.hpp"
+#include "core/infer/inference.hpp"
+#include "core/pack/solve_pack.hpp"
+#include "core/solve/box_qp.hpp"
+#include "core/solve/normal_equations.hpp"
+#include "core/solve/rbf.hpp"
+#include "core/stabilise/stabiliser.hpp"
+
+namespace rig {
+
+struct SolverConfig {
+    SolvePack pack;          // spans; the bytes outlive the solver
+    NormalTables tables;     // built once
+    BoxQpConfig qp;
+    double rate_hz = 60.0;
+    double forget_s = 0.25;  // the temporal prior starts anew after a gap of this length
+};
+
+struct SolverState {
+    BoxQpState qp;
+    bool has_previous = false;
+    std::int64_t previous_us = 0;
+    std::array<double, kMaxShapes> previous{};
+    // Confidence changes only with what is seen, so it is kept until that changes.
+    bool has_confidence = false;
+    std::array<std::uint8_t, kMaxMarkers> pattern{};
+    std::array<float, kMaxShapes> confidence{};
+};
+
+struct SolverWorkspace {
+    NormalEquations equations;
+    BoxQpWorkspace qp;
+    RbfWorkspace rbf;
+    std::array<Vec3, kMaxMarkers> positions_mm{};
+    std::array<Mat3, kMaxMarkers> weights{};
+    std::array<double, kMaxShapes> low{};
+    std::array<double, kMaxShapes> high{};
+    std::array<double, kMaxShapes * kMaxShapes> posterior{};
+    std::array<double, kMaxShapes> diagonal{};
+    std::array<double, kMaxShapes> scratch{};
+    std::array<float, kMaxRows> flat_mm{};
+};
+
+struct SolverOutput {
+    std::array<double, kMaxShapes> weights{};     // inside [low, high] of the pack
+    std::array<float, kMaxShapes> confidence{};   // 0..1: 1 - sqrt(P_ii / P0_ii), methods.md section 3
+};
+
+struct SolverReport {
+    bool solved = false;           // false: nothing was seen; weights are the previous ones, or the rest pose
+    bool optimal = false;
+    double kkt = 0.0;              // of the pack's problem at the answer, before any clamping of least squares
+    double objective_mm2 = 0.0;
+    std::uint16_t iterations = 0;
+    std::uint16_t markers_used = 0;
+    double residual_rms_mm = 0.0;
+    double hull_distance = 0.0;    // RBF: distance to the nearest centre, in that centre's widths
+};
+
+void configure_solver(const SolvePack& pack, double rate_hz, SolverConfig& config);
+void reset_solver(SolverState& state);
+
+void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const InferenceOutput& completed,
+           std::int64_t capture_us, SolverState& state, SolverWorkspace& workspace, SolverOutput& output,
+           SolverReport& report);
+
+}  // namespace rig

@@ -1,0 +1,51 @@
+#include "core/track/sightings.hpp"
+
+#include <algorithm>
+
+#include "core/base/check.hpp"
+#include "core/base/math.hpp"
+
+namespace rig {
+
+namespace {
+
+void append(SightingSet& set, std::size_t view, std::size_t index, const Sighting& sighting) {
+    if (!set.views[view].push_back(sighting)) return;
+    const bool kept = set.source[view].push_back(static_cast<std::uint16_t>(index));
+    RIG_CHECK(kept);
+}
+
+bool finite(const Vec3& x) {
+    return is_finite(x[0]) && is_finite(x[1]) && is_finite(x[2]);
+}
+
+}  // namespace
+
+void add_camera_view(const CameraModel& camera, std::span<const Observation> observations, double sigma_px,
+                     double expected_depth_mm, SightingSet& set) {
+    RIG_CHECK(set.view_count < kMaxCameras);
+    const std::size_t view = set.view_count++;
+    set.from_cameras = true;
+    const double sigma_mm = sigma_px * expected_depth_mm / (0.5 * (camera.fx_px + camera.fy_px));
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+        Sighting sighting;
+        sighting.point_mm = camera.centre_mm;
+        sighting.direction = pixel_ray(camera, Vec2{static_cast<double>(observations[i].x_px),
+                                                    static_cast<double>(observations[i].y_px)});
+        sighting.information = 1.0 / (sigma_mm * sigma_mm);
+        if (finite(sighting.direction)) append(set, view, i, sighting);
+    }
+}
+
+void add_point_view(std::span<const Vec3> points_mm, double sigma_mm, SightingSet& set) {
+    RIG_CHECK(set.view_count < kMaxCameras);
+    const std::size_t view = set.view_count++;
+    for (std::size_t i = 0; i < points_mm.size(); ++i) {
+        // Beyond a metre from the rig's origin nothing is a marker, and squares stay far from overflow.
+        constexpr double kReachMm = 1000.0;
+        if (!finite(points_mm[i]) || points_mm[i].cwiseAbs().maxCoeff() > kReachMm) continue;
+        append(set, view, i, Sighting{points_mm[i], Vec3::Zero(), 1.0 / (sigma_mm * sigma_mm)});
+    }
+}
+
+}  // namespace rig

@@ -1,0 +1,243 @@
+#include "core/track/tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/check.hpp"
+#include "core/base/math.hpp"
+
+namespace rig {
+
+namespace {
+
+constexpr double kBiasLearning = 0.02;  // per frame: follows a head the model does not quite fit within a second
+
+std::span<const Vec3> predicted(const ShapeModel& model, const TrackerWorkspace& w) {
+    return {w.predicted_mm.data(), model.marker_count};
+}
+
+ShapePrior prior_from(const TrackerConfig& config, const TrackerState& state) {
+    ShapePrior prior;
+    prior.pose = state.fit.pose;
+    prior.rotation_sigma_rad = config.pose_sigma_rad;
+    prior.translation_sigma_mm = config.pose_sigma_mm;
+    prior.coefficients = state.fit.coefficients;
+    prior.coefficient_sigma = config.expression_sigma;
+    return prior;
+}
+
+// Where each marker should be: its own motion goes on when it was seen just now, otherwise the face tells.
+void predict_motion(const ShapeModel& model, const TrackerConfig& config, const TrackerState& state,
+                    TrackerWorkspace& w) {
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        w.predicted_mm[k] = state.missed[k] == 0
+                                ? Vec3{state.position_mm[k] + config.velocity_keep * state.velocity_mm[k]}
+                                : Vec3{state.fit.headset_position(model, k) + state.bias_mm[k]};
+    }
+}
+
+void predict_face(const ShapeModel& model, const ShapeFit& fit, const TrackerState& state, TrackerWorkspace& w) {
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        w.predicted_mm[k] = fit.headset_position(model, k) + state.bias_mm[k];
+    }
+}
+
+double residual_of(const ShapeModel& model, const ShapeFit& fit, const TrackerState& state, const NamedMarkers& named,
+                   std::size_t k) {
+    const Vec3 e = named.markers[k].position_mm - fit.headset_position(model, k) - state.bias_mm[k];
+    // Only what was measured counts: the depth along a single ray was predicted.
+    const double trust = named.markers[k].information.trace();
+    const Vec3 measured = named.markers[k].information * e;
+    return trust > 0.0 ? std::sqrt(e.dot(measured) * 3.0 / trust) : 0.0;
+}
+
+// Fit, then again without the names that the first fit contradicts.
+void fit_face(const ShapeModel& model, const TrackerConfig& config, const TrackerState& state,
+              const NamedMarkers& named, TrackerWorkspace& w) {
+    const ShapePrior prior = prior_from(config, state);
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        const NamedMarker& marker = named.markers[k];
+        w.positions_mm[k] = marker.position_mm - state.bias_mm[k];
+        w.informations[k] = marker.seen ? marker.information : Mat3{Mat3::Zero()};
+    }
+    const std::span<const Vec3> positions(w.positions_mm.data(), model.marker_count);
+    const std::span<const Mat3> informations(w.informations.data(), model.marker_count);
+    fit_shape(model, positions, informations, prior, 2, state.fit, w.fit, w.next);
+    bool doubted = false;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        if (!named.markers[k].seen) continue;
+        const double residual = residual_of(model, w.next, state, named, k);
+        if (residual <= config.outlier_mm) continue;
+        // A doubted name keeps a little weight: the wrong fit may be what contradicts a right name.
+        const double ratio = config.outlier_mm / residual;
+        w.informations[k] *= 0.05 * ratio * ratio;
+        doubted = true;
+    }
+    if (!doubted) return;
+    const ShapeFit before = w.next;
+    fit_shape(model, positions, informations, prior, 2, before, w.fit, w.next);
+}
+
+// Names that do not lie on the fitted face are taken back.
+void reject_outliers(const ShapeModel& model, const TrackerConfig& config, const TrackerState& state,
+                     const ShapeFit& fit, NamedMarkers& named, Matches& matches, TrackerReport& report) {
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        if (!named.markers[k].seen || residual_of(model, fit, state, named, k) <= config.outlier_mm) continue;
+        named.markers[k] = NamedMarker{};
+        for (auto& view : matches) view[k] = -1;
+        ++report.rejected;
+    }
+}
+
+void remember(const ShapeModel& model, const NamedMarkers& named, const ShapeFit& fit, TrackerState& state,
+              TrackerReport& report) {
+    double sum = 0.0;
+    report.seen = 0;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        const NamedMarker& marker = named.markers[k];
+        if (!marker.seen) {
+            state.missed[k] = static_cast<std::uint16_t>(std::min<int>(state.missed[k] + 1, 60000));
+            state.velocity_mm[k] = Vec3::Zero();
+            continue;
+        }
+        const Vec3 step = marker.position_mm - state.position_mm[k];
+        state.velocity_mm[k] = state.missed[k] == 0 ? step : Vec3{Vec3::Zero()};
+        state.position_mm[k] = marker.position_mm;
+        state.missed[k] = 0;
+        const Vec3 off = marker.position_mm - fit.headset_position(model, k);
+        sum += (off - state.bias_mm[k]).squaredNorm();
+        state.bias_mm[k] += kBiasLearning * (off - state.bias_mm[k]);
+        ++report.seen;
+    }
+    state.fit = fit;
+    report.residual_mm = report.seen == 0 ? 0.0 : std::sqrt(sum / report.seen);
+}
+
+void count_changes(const ShapeModel& model, const SightingSet& sightings, const Matches& before, const Matches& after,
+                   TrackerReport& report) {
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        bool changed = false;
+        for (std::size_t view = 0; view < sightings.view_count; ++view) {
+            changed = changed || (before[view][k] >= 0 && after[view][k] >= 0 && before[view][k] != after[view][k]);
+        }
+        report.swaps_repaired = static_cast<std::uint16_t>(report.swaps_repaired + (changed ? 1 : 0));
+    }
+}
+
+void clear_matches(Matches& matches) {
+    for (auto& view : matches) view.fill(-1);
+}
+
+// Starts from the fit of a bootstrap: nothing is remembered yet, so the face alone predicts.
+void begin_tracking(const ShapeModel& model, const ShapeFit& fit, TrackerState& state) {
+    const BootstrapState starts = state.bootstrap;
+    state = TrackerState{};
+    state.bootstrap = starts;
+    state.fit = fit;
+    state.tracking = true;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        state.missed[k] = 1;
+        state.position_mm[k] = fit.headset_position(model, k);
+    }
+}
+
+void notice_loss(const ShapeModel& model, const TrackerConfig& config, TrackerState& state, TrackerReport& report) {
+    const double needed = std::max(static_cast<double>(kMinMarkers), config.lost_share * model.marker_count);
+    state.poor_frames = report.seen < needed ? static_cast<std::uint16_t>(state.poor_frames + 1) : std::uint16_t{0};
+    if (state.poor_frames >= config.lost_frames) reset_tracker(state);
+    report.tracking = state.tracking;
+}
+
+void clear_named(const ShapeModel& model, NamedMarkers& named) {
+    named.count = model.marker_count;
+    for (std::size_t k = 0; k < model.marker_count; ++k) named.markers[k] = NamedMarker{};
+}
+
+}  // namespace
+
+void reset_tracker(TrackerState& state) {
+    state = TrackerState{};
+}
+
+void track(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings, TrackerState& state,
+           TrackerWorkspace& w, NamedMarkers& named, TrackerReport& report) {
+    report = TrackerReport{};
+    clear_matches(w.matches);
+    clear_named(model, named);
+    if (!state.tracking) {
+        ShapeFit found;
+        const BootstrapReport start =
+            bootstrap(model, config.bootstrap, config.nominal, sightings, state.bootstrap, w.bootstrap, found);
+        if (!start.found) {
+            report.matches = w.matches;
+            return;
+        }
+        begin_tracking(model, found, state);
+        report.bootstrapped = true;
+    }
+    predict_motion(model, config, state, w);
+    match_views(predicted(model, w), sightings, config.first_gate_mm, w.matching, w.matches);
+    w.first_matches = w.matches;
+    combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named);
+    fit_face(model, config, state, named, w);
+
+    predict_face(model, w.next, state, w);
+    match_views(predicted(model, w), sightings, config.final_gate_mm, w.matching, w.matches);
+    combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named);
+    fit_face(model, config, state, named, w);
+    reject_outliers(model, config, state, w.next, named, w.matches, report);
+    count_changes(model, sightings, w.first_matches, w.matches, report);
+    remember(model, named, w.next, state, report);
+    report.matches = w.matches;
+    notice_loss(model, config, state, report);
+}
+
+void check_names(const ShapeModel& model, const TrackerConfig& config, std::span<const Vec3> labelled_mm,
+                 double sigma_mm, TrackerState& state, TrackerWorkspace& w, SightingSet& scratch, NamedMarkers& named,
+                 TrackerReport& report) {
+    RIG_CHECK(labelled_mm.size() == model.marker_count);
+    report = TrackerReport{};
+    clear_matches(w.matches);
+    clear_named(model, named);
+    scratch.clear();
+    add_point_view(labelled_mm, sigma_mm, scratch);
+    for (std::size_t i = 0; i < scratch.views[0].size(); ++i) {
+        w.matches[0][scratch.source[0][i]] = static_cast<std::int16_t>(i);
+    }
+    w.first_matches = w.matches;
+    if (!state.tracking) {
+        ShapeFit start;
+        start.pose = config.nominal;
+        begin_tracking(model, start, state);
+        report.bootstrapped = true;
+        // Nothing is known before the first frame: let the claimed names place the face.
+        state.fit.coefficients.fill(0.0);
+    }
+    TrackerConfig wide = config;
+    if (report.bootstrapped) {
+        wide.pose_sigma_rad = config.bootstrap.rotation_sigma_rad;
+        wide.pose_sigma_mm = config.bootstrap.translation_sigma_mm;
+        wide.expression_sigma = 1.5;
+    }
+    predict_face(model, state.fit, state, w);
+    combine_views(predicted(model, w), scratch, config.gap_limit_mm, w.matches, named);
+    fit_face(model, wide, state, named, w);
+    bool contradicted = false;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        contradicted = contradicted || (named.markers[k].seen &&
+                                        residual_of(model, w.next, state, named, k) > config.outlier_mm);
+    }
+    if (contradicted) {
+        predict_face(model, w.next, state, w);
+        match_views(predicted(model, w), scratch, config.final_gate_mm, w.matching, w.matches);
+        combine_views(predicted(model, w), scratch, config.gap_limit_mm, w.matches, named);
+        fit_face(model, wide, state, named, w);
+        reject_outliers(model, config, state, w.next, named, w.matches, report);
+        count_changes(model, scratch, w.first_matches, w.matches, report);
+    }
+    remember(model, named, w.next, state, report);
+    report.matches = w.matches;
+    notice_loss(model, config, state, report);
+}
+
+}  // namespace rig
