@@ -43,9 +43,13 @@ class LinkBench {
 
 class LoopbackBench : public LinkBench {
   public:
-    explicit LoopbackBench(sim::LoopbackKind kind) : pair_(4096, kind) { EXPECT_TRUE(pair_.far_end().open()); }
+    explicit LoopbackBench(sim::LoopbackKind kind) : pair_(4096, kind) {
+        EXPECT_TRUE(pair_.far_end().open());
+    }
     ByteLink& link() override { return pair_.near_end(); }
-    void send_other(ByteSpan bytes) override { EXPECT_EQ(pair_.far_end().write(bytes).value(), bytes.size()); }
+    void send_other(ByteSpan bytes) override {
+        EXPECT_EQ(pair_.far_end().write(bytes).value(), bytes.size());
+    }
     Bytes receive_other(std::size_t limit) override {
         Bytes all;
         Bytes part(limit);

@@ -159,10 +159,12 @@ TEST_P(ClockContract, InterruptWorksInASignalHandler) {
 INSTANTIATE_TEST_SUITE_P(
     Backends, ClockContract,
     testing::Values(
-        ClockBackend{"Monotonic", []() -> std::unique_ptr<ClockBench> { return std::make_unique<MonotonicBench>(); }},
+        ClockBackend{"Monotonic",
+                     []() -> std::unique_ptr<ClockBench> { return std::make_unique<MonotonicBench>(); }},
         ClockBackend{"ManualAdvancing",
                      []() -> std::unique_ptr<ClockBench> { return std::make_unique<AdvancingBench>(); }},
-        ClockBackend{"ManualDriven", []() -> std::unique_ptr<ClockBench> { return std::make_unique<DrivenBench>(); }},
+        ClockBackend{"ManualDriven",
+                     []() -> std::unique_ptr<ClockBench> { return std::make_unique<DrivenBench>(); }},
         ClockBackend{"WorldLockstep",
                      []() -> std::unique_ptr<ClockBench> {
                          return std::make_unique<WorldBench>(sim::WorldPace::kLockstep);

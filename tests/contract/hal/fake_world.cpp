@@ -38,7 +38,8 @@ WorldMessage plain(WorldMessageKind kind, std::int64_t time_us) {
     return message;
 }
 
-WorldMessage frame_set(std::uint32_t slot, std::uint32_t sequence, std::int64_t time_us, std::uint8_t camera_mask) {
+WorldMessage frame_set(std::uint32_t slot, std::uint32_t sequence, std::int64_t time_us,
+                       std::uint8_t camera_mask) {
     WorldMessage message = plain(WorldMessageKind::kFrameSet, time_us);
     message.slot = slot;
     message.sequence = sequence;
@@ -112,8 +113,8 @@ bool FakeWorld::receive(WorldMessage& message, int patience_ms) {
     while (got < sizeof(message)) {
         pollfd watched{connection_.get(), POLLIN, 0};
         if (poll(&watched, 1, patience_ms) != 1) return false;
-        const ssize_t part = recv(connection_.get(), reinterpret_cast<std::byte*>(&message) + got,
-                                  sizeof(message) - got, 0);
+        const ssize_t part =
+            recv(connection_.get(), reinterpret_cast<std::byte*>(&message) + got, sizeof(message) - got, 0);
         if (part <= 0) return false;
         got += static_cast<std::size_t>(part);
     }
@@ -126,7 +127,8 @@ void FakeWorld::paint(std::uint32_t slot, std::uint32_t sequence) {
                                               static_cast<std::uint8_t>(sequence * 16 + camera));
         const std::uint64_t index = std::uint64_t{slot} * hello_.camera_count + camera;
         const auto offset = static_cast<off_t>(hello_.image_offset + index * hello_.image_stride_bytes);
-        RIG_CHECK(pwrite(memory_.get(), image.data(), image.size(), offset) == static_cast<ssize_t>(image.size()));
+        RIG_CHECK(pwrite(memory_.get(), image.data(), image.size(), offset) ==
+                  static_cast<ssize_t>(image.size()));
     }
 }
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <atomic>
-#include <cstdint>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <thread>
@@ -37,12 +37,15 @@ class FakeWorld {
     [[nodiscard]] bool receive(sim::WorldMessage& message, int patience_ms = 2000);
     void hang_up() { connection_.reset(); }
 
-    // By a thread of its own: greets, delivers `frames` frame sets (image value = sequence * 16 + camera) and ends.
-    // Lockstep: waits for every tick to be done. Real time: at the hello's rate, dropping when no slot is free.
+    // By a thread of its own: greets, delivers `frames` frame sets (image value = sequence * 16 + camera) and
+    // ends. Lockstep: waits for every tick to be done. Real time: at the hello's rate, dropping when no slot
+    // is free.
     void perform(std::uint32_t frames);
     void wait_performed();
 
-    [[nodiscard]] std::vector<sim::WorldMessage> controls() const { return controls_; }  // after wait_performed()
+    [[nodiscard]] std::vector<sim::WorldMessage> controls() const {
+        return controls_;
+    }  // after wait_performed()
     void paint(std::uint32_t slot, std::uint32_t sequence);
 
   private:

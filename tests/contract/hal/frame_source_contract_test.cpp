@@ -18,8 +18,8 @@ namespace {
 constexpr std::uint32_t kFrames = 12;
 constexpr std::int64_t kPeriod_us = 10'000;
 
-// A camera of 8x6 px at 100 Hz that delivers kFrames frames and ends; every pixel of a frame has one value, and
-// consecutive frames differ.
+// A camera of 8x6 px at 100 Hz that delivers kFrames frames and ends; every pixel of a frame has one value,
+// and consecutive frames differ.
 class FrameBench {
   public:
     virtual ~FrameBench() = default;
@@ -43,7 +43,8 @@ class ReplayBench : public FrameBench {
 
   private:
     static std::vector<std::vector<std::uint8_t>> images() {
-        return {std::vector<std::uint8_t>(48, 10), std::vector<std::uint8_t>(48, 20), std::vector<std::uint8_t>(48, 30)};
+        return {std::vector<std::uint8_t>(48, 10), std::vector<std::uint8_t>(48, 20),
+                std::vector<std::uint8_t>(48, 30)};
     }
     sim::ManualClock clock_;
     sim::ReplayFrameSource source_{clock_, 8, 6, images(), pacing()};
@@ -58,7 +59,8 @@ class SyntheticBench final : public FrameBench {
     sim::ManualClock clock_{7'000'000};
     sim::SyntheticFrameSource source_{clock_, 8, 6,
                                       [](std::uint32_t frame, std::span<std::uint8_t> pixels) {
-                                          std::fill(pixels.begin(), pixels.end(), static_cast<std::uint8_t>(frame));
+                                          std::fill(pixels.begin(), pixels.end(),
+                                                    static_cast<std::uint8_t>(frame));
                                       },
                                       pacing()};
 };
@@ -211,8 +213,10 @@ TEST_P(FrameSourceContract, ControlsHaveRanges) {
 INSTANTIATE_TEST_SUITE_P(
     Backends, FrameSourceContract,
     testing::Values(
-        FrameBackend{"Replay", []() -> std::unique_ptr<FrameBench> { return std::make_unique<ReplayBench>(); }},
-        FrameBackend{"Synthetic", []() -> std::unique_ptr<FrameBench> { return std::make_unique<SyntheticBench>(); }},
+        FrameBackend{"Replay",
+                     []() -> std::unique_ptr<FrameBench> { return std::make_unique<ReplayBench>(); }},
+        FrameBackend{"Synthetic",
+                     []() -> std::unique_ptr<FrameBench> { return std::make_unique<SyntheticBench>(); }},
         FrameBackend{"FaultlessFaulty",
                      []() -> std::unique_ptr<FrameBench> { return std::make_unique<FaultlessBench>(); }},
         FrameBackend{"WorldLockstep",

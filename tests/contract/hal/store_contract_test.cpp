@@ -110,15 +110,19 @@ TEST_P(StoreContract, SyncedChangesSurviveARestart) {
     EXPECT_EQ(read_back(bench_->store(), 10, 20), filled(20, 7));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Backends, StoreContract,
-    testing::Values(
-        StoreBackend{"Memory", []() -> std::unique_ptr<StoreBench> { return std::make_unique<MemoryBench>(); }},
-        StoreBackend{"Posix", []() -> std::unique_ptr<StoreBench> { return std::make_unique<PosixBench>(); }}),
-    [](const auto& backend) { return std::string(backend.param.name); });
+INSTANTIATE_TEST_SUITE_P(Backends, StoreContract,
+                         testing::Values(StoreBackend{"Memory",
+                                                      []() -> std::unique_ptr<StoreBench> {
+                                                          return std::make_unique<MemoryBench>();
+                                                      }},
+                                         StoreBackend{"Posix",
+                                                      []() -> std::unique_ptr<StoreBench> {
+                                                          return std::make_unique<PosixBench>();
+                                                      }}),
+                         [](const auto& backend) { return std::string(backend.param.name); });
 
-// A change of two halves with one sync, cut at every operation in every way: before the sync nothing is promised but
-// old, half or new bytes; from a good sync on, new bytes.
+// A change of two halves with one sync, cut at every operation in every way: before the sync nothing is
+// promised but old, half or new bytes; from a good sync on, new bytes.
 TEST(MemoryStorePowerCut, EveryOperationInEveryWay) {
     for (const auto outcome : {sim::CutOutcome::kNotDone, sim::CutOutcome::kHalf, sim::CutOutcome::kDone}) {
         for (std::uint64_t cut = 0; cut <= 3; ++cut) {
@@ -140,8 +144,9 @@ TEST(MemoryStorePowerCut, EveryOperationInEveryWay) {
             store.power_on();
             const auto head = read_back(store, 0, 10);
             const auto middle = read_back(store, 50, 10);
-            const auto done = static_cast<std::ptrdiff_t>(
-                synced || outcome == sim::CutOutcome::kDone ? 10 : outcome == sim::CutOutcome::kHalf ? 5 : 0);
+            const auto done = static_cast<std::ptrdiff_t>(synced || outcome == sim::CutOutcome::kDone ? 10
+                                                          : outcome == sim::CutOutcome::kHalf         ? 5
+                                                                                                      : 0);
             EXPECT_EQ(std::count(head.begin(), head.end(), std::byte{2}), done);
             EXPECT_EQ(std::count(middle.begin(), middle.end(), std::byte{3}), cut >= 1 ? done : 0);
             EXPECT_EQ(read_back(store, 20, 30), filled(30, 1));

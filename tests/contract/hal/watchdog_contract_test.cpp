@@ -1,4 +1,5 @@
-// The contract of hal/watchdog.hpp, on every backend: who supervises sees arm, feeds and disarm, and nothing blocks.
+// The contract of hal/watchdog.hpp, on every backend: who supervises sees arm, feeds and disarm, and nothing
+// blocks.
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -114,13 +115,16 @@ TEST_P(WatchdogContract, ASupervisorThatDoesNotListenNeverBlocks) {
     bench_->watchdog().disarm();
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Backends, WatchdogContract,
-    testing::Values(
-        WatchdogBackend{"Memory", []() -> std::unique_ptr<WatchdogBench> { return std::make_unique<MemoryBench>(); }},
-        WatchdogBackend{"Systemd",
-                        []() -> std::unique_ptr<WatchdogBench> { return std::make_unique<SystemdBench>(); }}),
-    [](const auto& backend) { return std::string(backend.param.name); });
+INSTANTIATE_TEST_SUITE_P(Backends, WatchdogContract,
+                         testing::Values(WatchdogBackend{"Memory",
+                                                         []() -> std::unique_ptr<WatchdogBench> {
+                                                             return std::make_unique<MemoryBench>();
+                                                         }},
+                                         WatchdogBackend{"Systemd",
+                                                         []() -> std::unique_ptr<WatchdogBench> {
+                                                             return std::make_unique<SystemdBench>();
+                                                         }}),
+                         [](const auto& backend) { return std::string(backend.param.name); });
 
 TEST(MemoryWatchdog, NoticesAMissedFeedForGood) {
     sim::ManualClock clock;
