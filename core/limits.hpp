@@ -19,6 +19,14 @@ inline constexpr std::size_t kMaxRbfCentres = 256;    // reference frames of one
 inline constexpr std::size_t kMaxRbfDimensions = 32;  // principal components kept; the sources use 4 to 20
 inline constexpr std::size_t kMaxImageWidth = 1920;   // px
 inline constexpr std::size_t kMaxImageHeight = 1200;  // px
+inline constexpr std::size_t kBlockPx = 4;            // side of the squares whose means make the local background
+inline constexpr std::size_t kMaxBlocks = (kMaxImageWidth / kBlockPx) * (kMaxImageHeight / kBlockPx);
+inline constexpr std::size_t kMaxRuns = 32768;        // horizontal runs of one image and polarity; a face has 2,000
+inline constexpr std::size_t kMaxSplitRuns = 8192;    // runs of one component that is cut again at a deeper level
+inline constexpr std::size_t kMaxBlobs = 2048;        // components of a marker's least area or more, per image
+inline constexpr std::size_t kMaxCandidates = 1024;   // blobs that passed every check, before the best are kept
+inline constexpr std::size_t kBlobWindowPx = 64;      // square in which one blob is measured: one machine word a row
+inline constexpr std::size_t kMaxDotDiameterPx = 48;  // leaves 8 px of skin on every side inside the window
 inline constexpr std::size_t kMaxNameBytes = 63;      // of one shape or marker, UTF-8
 inline constexpr std::size_t kMaxPackBoards = 16;     // boards that one pack names as compatible
 inline constexpr std::size_t kMaxPackBytes = std::size_t{64} << 20;
@@ -32,5 +40,8 @@ static_assert(4 * (kMaxRows * kMaxShapes + kMaxRbfDimensions * kMaxRows + kMaxRb
                    kMaxRbfCentres * kMaxShapes) <=
               kMaxPackBytes / 2);
 static_assert(kMaxModes <= kMaxShapes);
+static_assert(kMaxDotDiameterPx + 16 <= kBlobWindowPx);
+static_assert(kMaxCandidates >= kMaxObservations);
+static_assert(kMaxImageWidth % kBlockPx == 0 && kMaxImageHeight % kBlockPx == 0);
 
 }  // namespace rig

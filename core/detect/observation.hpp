@@ -8,6 +8,9 @@
 
 namespace rig {
 
+// What the markers are: darker than the skin (ink), brighter (retro-reflective), or decided from the images.
+enum class MarkerPolarity : std::uint8_t { kAuto = 0, kDark = 1, kBright = 2 };
+
 // One blob. Coordinates are raw (distorted) pixels, integers at pixel centres.
 struct Observation {
     float x_px = 0.0F;

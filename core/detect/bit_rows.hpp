@@ -1,0 +1,38 @@
+// A window of up to 64 x 64 pixels as one machine word a row: growth, shrinking and flooding by shifts.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/limits.hpp"
+
+namespace rig {
+
+static_assert(kBlobWindowPx == 64);
+
+using BitRows = std::array<std::uint64_t, kBlobWindowPx>;
+
+// Pixel x of a row is bit x; pixels outside the window do not exist, so callers cut with their window's row mask.
+[[nodiscard]] inline std::uint64_t row_mask(int width) {
+    return width >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << width) - 1;
+}
+
+[[nodiscard]] inline std::uint64_t bit_span(int begin, int end) {
+    return row_mask(end) & ~row_mask(begin);
+}
+
+[[nodiscard]] int count_bits(const BitRows& rows, int height);
+
+// One step into the four (eight) neighbours.
+void grow_cross(BitRows& rows, int height);
+void grow_square(BitRows& rows, int height);
+
+// Keeps the part of `allowed` that is connected (eight neighbours) with `seed`; the result is in `seed`.
+void flood(BitRows& seed, const BitRows& allowed, int height);
+
+// Fills every hole of `rows`: pixels that four-connected steps outside the set cannot reach from the border.
+void fill_holes(BitRows& rows, int width, int height);
+
+}  // namespace rig

@@ -1,0 +1,45 @@
+// Connected components of runs: union-find of fixed capacity, eight-connected. Not for: pixels or shapes.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/image/kernels.hpp"
+
+namespace rig {
+
+// Runs [first, first + count) of `grouped` in raster order; bounds are inclusive.
+struct Component {
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+    std::uint32_t area_px = 0;
+    std::uint16_t left = 0;
+    std::uint16_t top = 0;
+    std::uint16_t right = 0;
+    std::uint16_t bottom = 0;
+};
+
+struct ComponentLimits {
+    std::uint32_t min_area_px = 1;
+};
+
+// Storage that connect() borrows: parents, areas and grouped are as long as the longest input.
+struct ComponentStorage {
+    std::span<std::uint32_t> parents;
+    std::span<std::uint32_t> areas;
+    std::span<Run> grouped;
+    std::span<Component> components;
+};
+
+struct ComponentCounts {
+    std::size_t components = 0;
+    std::size_t small = 0;    // left out: area below the least
+    std::size_t dropped = 0;  // left out: no room
+};
+
+// Groups `runs` (raster order, not overlapping) into components, numbered by their first run. Components below the
+// least area are counted and left out, so that noise cannot fill the table.
+ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits, const ComponentStorage& storage);
+
+}  // namespace rig

@@ -1,0 +1,115 @@
+// The detection stage: a grey image in, marker observations out. Adaptive threshold against a morphological background,
+// connected runs, and for every blob its own mid-contrast measurement. Not for: names, memory of positions, distortion.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "core/base/bounded_vector.hpp"
+#include "core/base/faults.hpp"
+#include "core/base/result.hpp"
+#include "core/detect/blob.hpp"
+#include "core/detect/observation.hpp"
+#include "core/image/view.hpp"
+#include "core/limits.hpp"
+
+namespace rig {
+
+struct DetectorConfig {
+    MarkerPolarity polarity = MarkerPolarity::kAuto;
+    BlobLimits blob;                    // see there: diameters, contrast, shape
+    double relative_contrast = 0.25;    // of the background, that a pixel needs to belong to a candidate
+    double min_score = 0.15;            // 0..1, below which a blob is not handed on
+    double size_ratio = 1.75;           // long axis against the median of the image: outside [1/r, r] is no marker
+    std::uint16_t size_quorum = 8;      // markers needed before that median says anything
+    double dark_luma = 4.0;             // mean grey level below which the image is called dark (F13)
+    double saturated_fraction = 0.25;   // of 255s, above which it is called flooded (F13)
+    double luma_step = 0.4;             // change of the mean, relative to the usual, that is called a step (F13)
+    std::uint8_t polarity_frames = 8;   // equal decisions before automatic polarity stops looking at both sides
+};
+
+enum class DetectorError : std::uint8_t { kDiameters, kContrast, kShape, kScore, kExposure };
+
+enum class ExposureFlag : std::uint8_t { kDark = 1, kFlooded = 2, kStep = 4 };
+
+struct DetectorReport {
+    std::uint32_t runs = 0;
+    std::uint32_t candidates = 0;                                                   // blobs measured
+    std::array<std::uint32_t, static_cast<std::size_t>(Rejection::kCount)> rejected{};  // by Rejection
+    std::uint32_t low_score = 0;
+    std::uint32_t left_out = 0;         // good blobs beyond kMaxObservations, the lowest scored
+    bool runs_full = false;             // a capacity was reached: runs, blobs, observations
+    bool blobs_full = false;
+    bool observations_full = false;
+    bool unprocessable = false;         // no image, or larger than the limits
+    MarkerPolarity polarity = MarkerPolarity::kDark;  // the side the observations come from
+    double mean_luma = 0.0;             // grey levels
+    double saturated_fraction = 0.0;
+    std::uint8_t exposure = 0;          // ExposureFlag bits
+    FaultMap faults = 0;                // kExposure, kBlobCapacity
+};
+
+// One camera's detector. Memory is fixed (about 4 MB); detect() never allocates and never fails: hard data give few
+// observations and a report. Observations are in raster order of their first pixel.
+class Detector {
+  public:
+    // Validates once. On failure the detector keeps its previous configuration.
+    [[nodiscard]] Result<void, DetectorError> configure(const DetectorConfig& config);
+
+    // Every byte of the image inside width x height must be readable; anything else about it may be wrong.
+    void detect(const ImageView& image, Observations& observations, DetectorReport& report);
+
+    // Forgets polarity and luma learnt from earlier frames.
+    void reset() { state_ = State{}; }
+
+  private:
+    struct State {
+        MarkerPolarity polarity = MarkerPolarity::kAuto;  // the last decision
+        std::uint8_t agreed = 0;                          // frames in a row that said so
+        double usual_luma = -1.0;                         // running mean; negative before the first frame
+    };
+
+    using Blobs = BoundedVector<Blob, kMaxCandidates>;
+
+    // What one polarity makes of the image.
+    struct SideResult {
+        Blobs blobs;
+        DetectorReport report;
+        double quality = 0.0;
+    };
+
+    struct Workspace {
+        std::array<std::uint8_t, kMaxBlocks> means{};
+        std::array<std::uint8_t, kMaxBlocks> background{};
+        std::array<Run, kMaxRuns> runs{};
+        std::array<std::uint32_t, kMaxRuns> parents{};
+        std::array<std::uint32_t, kMaxRuns> areas{};
+        std::array<Run, kMaxRuns> grouped{};
+        std::array<Component, kMaxBlobs> components{};
+        std::array<Run, kMaxSplitRuns> split_runs{};
+        std::array<Run, kMaxSplitRuns> split_grouped{};
+        std::array<Component, kMaxBlobs> split_components{};
+        BlobWorkspace blob;
+        std::array<SideResult, 2> sides;
+    };
+
+    void measure_exposure(const ImageView& image, DetectorReport& report);
+    void detect_side(const ImageView& image, const BlockGrid& means, Side side, SideResult& result);
+    void set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side) const;
+    [[nodiscard]] bool has_core(const ImageView& image, const BlockGrid& thresholds, Side side,
+                                std::span<const Run> runs) const;
+    void examine(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,
+                 SideResult& result);
+    void split(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,
+               SideResult& result);
+    void apply_population(SideResult& result) const;
+    void decide(std::size_t dark_or_bright);
+    void hand_on(const SideResult& result, Observations& observations, DetectorReport& report) const;
+
+    DetectorConfig config_;
+    State state_;
+    Workspace workspace_;
+};
+
+}  // namespace rig

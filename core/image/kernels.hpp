@@ -1,0 +1,59 @@
+// Pixel kernels: block means, sliding extremes, thresholding into horizontal runs. Integers only, plain loops that a
+// compiler turns into vector code; the same bytes at any optimisation level. Not for: deciding what a marker is.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/image/view.hpp"
+#include "core/limits.hpp"
+
+namespace rig {
+
+// A grid of one byte per block of kBlockPx x kBlockPx pixels; block (x, y) is values[y * width + x].
+struct BlockGrid {
+    std::span<std::uint8_t> values;
+    int width = 0;
+    int height = 0;
+};
+
+[[nodiscard]] constexpr int blocks_across(int pixels) {
+    return (pixels + static_cast<int>(kBlockPx) - 1) / static_cast<int>(kBlockPx);
+}
+
+// Pixels [begin, end) of row y.
+struct Run {
+    std::uint16_t y = 0;
+    std::uint16_t begin = 0;
+    std::uint16_t end = 0;
+};
+
+// Every fourth row counts.
+struct LumaSums {
+    std::uint64_t sum = 0;
+    std::uint32_t saturated = 0;  // pixels of 255
+    std::uint32_t samples = 0;
+};
+
+// True if the kernels below can take the image: not empty and within kMaxImageWidth x kMaxImageHeight.
+[[nodiscard]] bool is_processable(const ImageView& image);
+
+// Mean of every block, rounded to nearest; blocks at the right and lower edge average the pixels they have.
+// `storage` holds at least the grid's blocks. Precondition: is_processable(image).
+[[nodiscard]] BlockGrid block_means(const ImageView& image, std::span<std::uint8_t> storage);
+
+[[nodiscard]] LumaSums luma_sums(const ImageView& image);
+
+// Extreme over the (2 radius + 1)^2 neighbourhood, clipped at the border, in place. 0 <= radius <= 32.
+void sliding_max(const BlockGrid& grid, int radius);
+void sliding_min(const BlockGrid& grid, int radius);
+
+enum class Side : std::uint8_t { kBelow, kAbove };
+
+// Runs of pixels strictly below (above) the threshold of their block, in raster order. Returns how many were written;
+// stops at the end of a row that might not fit and then sets `truncated`.
+[[nodiscard]] std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, Side side,
+                                         std::span<Run> runs, bool& truncated);
+
+}  // namespace rig
