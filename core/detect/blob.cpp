@@ -19,7 +19,9 @@ constexpr int kRedrawReach = 2;    // px that a redrawn outline may lie outside 
 constexpr int kMoatReach = 3;      // px
 constexpr int kOpenCover = 112;    // a moat pixel darker than this is no background
 constexpr int kCorePercent = 30;   // of the blob's pixels are darker than its core: clear of noise, glints and edge
-constexpr double kDeepScore = 0.7; // what a marker in a shadow is worth
+constexpr double kDeepBadness = 0.25;   // of a marker that only shows at the deep outline
+constexpr double kAspectBadness = 0.3;  // of the flattest disc
+constexpr double kSureSnr = 6.0;        // contrast / spread of the surroundings: less costs
 constexpr int kMinRing = 12;       // pixels that can carry a plane
 constexpr int kRounds = 2;         // outline -> background -> outline
 constexpr int kFraction = 256;     // of a grey level: fixed point of the background plane
@@ -377,12 +379,10 @@ void judge(const BlobWorkspace& w, const Moments& m, const PlaneFit& fit, const 
     blob.deviation = outline_deviation_px(w, m, radius);
     blob.open = open_part(w);
     const double aspect = blob.long_axis_px / blob.short_axis_px;
-    const double deviation_limit = 0.12 + 0.05 * radius;
+    const double deviation_limit = limits.max_deviation_px + limits.max_deviation * radius;
     const double snr = blob.contrast / std::max(1.0, fit.rms);
-    blob.score = std::clamp(1.0 - 0.5 * blob.deviation / deviation_limit, 0.0, 1.0) *
-                 std::clamp(1.0 - 0.5 * blob.open / limits.max_open, 0.0, 1.0) * std::clamp(snr / 8.0, 0.25, 1.0) *
-                 std::clamp(1.5 - 0.5 * aspect / limits.max_aspect, 0.0, 1.0);
-    blob.score = std::min(blob.score, 1.0);
+    blob.badness = blob.deviation / deviation_limit + blob.open / limits.max_open +
+                   kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) + std::max(0.0, kSureSnr - snr) / kSureSnr;
     blob.rejection = Rejection::kNone;
     if (blob.diameter_px < limits.min_diameter_px) {
         blob.rejection = Rejection::kSmall;
@@ -420,6 +420,7 @@ Rejection outline_at_mid_contrast(Side side, const Component& component, const B
         fit = refined_background(w, fit, core);
         blob.background = fit.plane.level;
         blob.contrast = fit.plane.level - core;
+        blob.depth = blob.contrast / std::max(1.0, side == Side::kBelow ? fit.plane.level : 255.0 - fit.plane.level);
         if (blob.contrast < limits.min_contrast) return Rejection::kFaint;
         compute_cover(w, side, fit.plane, blob.contrast);
         Rejection reason = Rejection::kNone;
@@ -467,7 +468,7 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
     Rejection reason = Rejection::kNone;
     if (shadowed && redraw_blob(w, kDeep, reason)) {
         measure_outline(image, fit, kDeep, limits, w, blob);
-        blob.score *= kDeepScore;
+        blob.badness += kDeepBadness;
     }
     return blob;
 }
