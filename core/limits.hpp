@@ -28,12 +28,17 @@ inline constexpr std::size_t kMaxCandidates = 1024;   // blobs that passed every
 inline constexpr std::size_t kBlobWindowPx = 64;      // square in which one blob is measured: one machine word a row
 inline constexpr std::size_t kMaxDotDiameterPx = 48;  // leaves 8 px of skin on every side inside the window
 inline constexpr std::size_t kMaxNameBytes = 63;      // of one shape or marker, UTF-8
+inline constexpr std::size_t kMaxPackBoards = 16;     // boards that one pack names as compatible
 inline constexpr std::size_t kMaxPackBytes = std::size_t{64} << 20;
 inline constexpr std::size_t kMaxManifestBytes = std::size_t{16} << 10;  // one read, before anything is trusted
 inline constexpr std::size_t kMaxWireFrameBytes = 655;                   // on the wire, delimiters included
 
 static_assert(kMaxObservations >= 2 * kMaxMarkers);
 static_assert(kMaxPoints >= 2 * kMaxMarkers);
+// the largest pack that can be written fits: basis, RBF basis, centres, weights as float32
+static_assert(4 * (kMaxRows * kMaxShapes + kMaxRbfDimensions * kMaxRows + kMaxRbfCentres * kMaxRbfDimensions +
+                   kMaxRbfCentres * kMaxShapes) <=
+              kMaxPackBytes / 2);
 static_assert(kMaxModes <= kMaxShapes);
 static_assert(kMaxDotDiameterPx + 16 <= kBlobWindowPx);
 static_assert(kMaxCandidates >= kMaxObservations);

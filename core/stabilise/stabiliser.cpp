@@ -8,6 +8,8 @@ namespace rig {
 
 namespace {
 
+constexpr double kHeldSigma = 1e-9;  // mm and rad: a pose that must not move
+
 std::size_t fill_input(const NamedMarkers& named, StabiliserWorkspace& w) {
     std::size_t seen = 0;
     for (std::size_t k = 0; k < named.count; ++k) {
@@ -34,6 +36,49 @@ void to_face_frame(const NamedMarkers& named, const Rigid& pose, StabiliserOutpu
     }
 }
 
+ShapeFit nominal_fit(const StabiliserConfig& config) {
+    ShapeFit fit;
+    fit.pose = config.nominal;
+    return fit;
+}
+
+ShapePrior wide_prior(const StabiliserConfig& config) {
+    ShapePrior prior;
+    prior.pose = config.nominal;
+    prior.rotation_sigma_rad = config.enabled ? config.rotation_sigma_rad : kHeldSigma;
+    prior.translation_sigma_mm = config.enabled ? config.translation_sigma_mm : kHeldSigma;
+    return prior;
+}
+
+bool moved_too_far(const StabiliserConfig& config, const Rigid& from, const Rigid& to) {
+    const Vec3 shift = to.translation_mm - from.translation_mm;
+    const Mat3 turned = to.rotation * from.rotation.transpose();
+    const Vec3 turn = vector_from_rotation(turned);
+    return std::sqrt(shift.dot(shift)) > config.jolt_sigmas * config.step_translation_sigma_mm ||
+           std::sqrt(turn.dot(turn)) > config.jolt_sigmas * config.step_rotation_sigma_rad;
+}
+
+// `fit` is the start on entry and the answer on return.
+void fit_pose(const ShapeModel& model, const StabiliserConfig& config, std::size_t count, const StabiliserState& state,
+              StabiliserWorkspace& w, ShapeFit& fit, StabiliserReport& report) {
+    const std::span<const Vec3> positions(w.positions_mm.data(), count);
+    const std::span<const Mat3> informations(w.informations.data(), count);
+    const ShapeFit start = fit;
+    if (state.warm && config.enabled) {
+        ShapePrior creeping;
+        creeping.pose = state.fit.pose;
+        creeping.rotation_sigma_rad = config.step_rotation_sigma_rad;
+        creeping.translation_sigma_mm = config.step_translation_sigma_mm;
+        fit_shape(model, positions, informations, creeping, config.iterations, start, w.fit, fit);
+        report.ok = fit.ok;
+        report.jolt = !fit.ok || moved_too_far(config, start.pose, fit.pose);
+        if (!report.jolt) return;
+    }
+    const int iterations = state.warm ? config.iterations : config.first_iterations;
+    fit_shape(model, positions, informations, wide_prior(config), iterations, start, w.fit, fit);
+    report.ok = fit.ok;
+}
+
 }  // namespace
 
 void reset_stabiliser(StabiliserState& state) {
@@ -44,21 +89,8 @@ void stabilise(const ShapeModel& model, const StabiliserConfig& config, const Na
                StabiliserState& state, StabiliserWorkspace& w, StabiliserOutput& output, StabiliserReport& report) {
     report = StabiliserReport{};
     const std::size_t seen = fill_input(named, w);
-    ShapePrior prior;
-    prior.pose = config.nominal;
-    prior.rotation_sigma_rad = config.enabled ? config.rotation_sigma_rad : 1e-9;
-    prior.translation_sigma_mm = config.enabled ? config.translation_sigma_mm : 1e-9;
-    ShapeFit start;
-    start.pose = config.nominal;
-    if (state.warm && config.enabled) start = state.fit;
-    if (seen >= kMinMarkers) {
-        const int iterations = state.warm ? config.iterations : config.first_iterations;
-        fit_shape(model, {w.positions_mm.data(), named.count}, {w.informations.data(), named.count}, prior, iterations,
-                  start, w.fit, output.fit);
-        report.ok = output.fit.ok;
-    } else {
-        output.fit = start;
-    }
+    output.fit = state.warm && config.enabled ? state.fit : nominal_fit(config);
+    if (seen >= kMinMarkers) fit_pose(model, config, named.count, state, w, output.fit, report);
     if (report.ok) {
         state.fit = output.fit;
         state.warm = true;

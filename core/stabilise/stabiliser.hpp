@@ -17,9 +17,12 @@ struct StabiliserConfig {
     Rigid nominal;                       // headset_from_face as calibrated
     double rotation_sigma_rad = 0.15;    // expected slip about the nominal pose
     double translation_sigma_mm = 12.0;
+    // Between frames a helmet creeps; when it moves by more than jolt_sigmas of this, the frame is fitted without it.
+    double step_rotation_sigma_rad = 0.0005;
+    double step_translation_sigma_mm = 0.05;
+    double jolt_sigmas = 2.5;
     int first_iterations = 6;            // Gauss-Newton steps from a cold start
     int iterations = 3;                  // ... from the previous frame
-    double rate_hz = 60.0;
 };
 
 struct StabiliserState {
@@ -47,6 +50,7 @@ struct StabiliserOutput {
 };
 
 struct StabiliserReport {
+    bool jolt = false;         // the helmet moved faster than it creeps
     bool ok = false;           // false: too little was seen; the previous pose is used
     double slip_rotation_rad = 0.0;
     double slip_translation_mm = 0.0;

@@ -1,0 +1,104 @@
+// The container around a solve pack, byte by byte: a fixed header, a manifest, aligned tensor sections.
+// Shared by the reader here and the writer on the host. Not the meaning of the tensors: solve_pack.hpp.
+//
+//   0   8  magic "RIGPACK1"
+//   8   4  u32 format version, 1
+//   12  4  u32 manifest length in bytes, 1..16384
+//   16  8  u64 total length of the file in bytes
+//   24  8  zero
+//   32 32  SHA-256 of the manifest
+//   64     manifest (FlatBuffers, manifest.fbs), then zeros to a multiple of 64
+//          sections in the order of the manifest's table, each at the next multiple of 64 after the one
+//          before, zeros between; the last one ends the file
+// All integers and floats little-endian. Tensors are float32, row-major. Names are UTF-8, each ended by '\n'.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "core/base/bytes.hpp"
+#include "core/pack/solve_pack.hpp"
+
+namespace rig {
+
+inline constexpr std::array<char, 8> kPackMagic{'R', 'I', 'G', 'P', 'A', 'C', 'K', '1'};
+inline constexpr std::uint32_t kPackFormatVersion = 1;
+inline constexpr std::uint16_t kSolverAbi = 1;  // grows when core reads a pack's numbers differently
+inline constexpr std::size_t kPackHeaderBytes = 64;
+inline constexpr std::size_t kPackAlignment = 64;  // a cache line, and more than any vector load needs
+inline constexpr std::size_t kHashBytes = 32;
+
+using Hash = std::array<std::byte, kHashBytes>;
+
+// SHA-256 of `bytes`. core has no library of its own; programs pass libsodium's.
+using HashFunction = void (*)(ByteSpan bytes, Hash& digest);
+
+enum class SectionType : std::uint16_t {
+    kNeutral = 1,
+    kBasis = 2,
+    kWeightLow = 3,
+    kWeightHigh = 4,
+    kPriorMean = 5,
+    kPriorSigma = 6,
+    kTemporalGamma = 7,
+    kShapeNames = 8,
+    kMarkerNames = 9,
+    kRbfMean = 10,
+    kRbfBasis = 11,
+    kRbfCentres = 12,
+    kRbfWidths = 13,
+    kRbfWeights = 14,
+    kRbfOffset = 15,
+};
+inline constexpr std::size_t kSectionTypeCount = 15;  // types are 1..kSectionTypeCount
+
+// "basis", "rbf centres", ...; "unknown" outside the enumeration.
+[[nodiscard]] std::string_view section_name(SectionType type);
+[[nodiscard]] constexpr bool is_rbf_section(SectionType type) {
+    return type >= SectionType::kRbfMean;
+}
+
+[[nodiscard]] constexpr std::uint64_t align_up(std::uint64_t offset) {
+    return (offset + (kPackAlignment - 1)) / kPackAlignment * kPackAlignment;
+}
+
+// Numbers a tensor section of this type has under these counts; 0 for the text sections.
+struct PackCounts {
+    std::size_t markers = 0;
+    std::size_t shapes = 0;
+    std::size_t rbf_dimensions = 0;
+    std::size_t rbf_centres = 0;
+};
+[[nodiscard]] constexpr std::size_t section_floats(SectionType type, const PackCounts& n) {
+    switch (type) {
+        case SectionType::kNeutral:
+        case SectionType::kRbfMean:
+            return 3 * n.markers;
+        case SectionType::kBasis:
+            return 3 * n.markers * n.shapes;
+        case SectionType::kWeightLow:
+        case SectionType::kWeightHigh:
+        case SectionType::kPriorMean:
+        case SectionType::kPriorSigma:
+        case SectionType::kTemporalGamma:
+        case SectionType::kRbfOffset:
+            return n.shapes;
+        case SectionType::kRbfBasis:
+            return n.rbf_dimensions * 3 * n.markers;
+        case SectionType::kRbfCentres:
+            return n.rbf_centres * n.rbf_dimensions;
+        case SectionType::kRbfWidths:
+            return n.rbf_centres;
+        case SectionType::kRbfWeights:
+            return n.rbf_centres * n.shapes;
+        case SectionType::kShapeNames:
+        case SectionType::kMarkerNames:
+            break;
+    }
+    return 0;
+}
+
+}  // namespace rig

@@ -1,0 +1,216 @@
+#include "firmware_host/companion/train/pack_writer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <span>
+
+#include "core/pack/manifest_generated.h"
+#include "firmware_host/pack_file/opened_pack.hpp"
+#include "firmware_host/pack_file/sha256.hpp"
+
+namespace rig::host {
+
+namespace {
+
+namespace fb = pack_manifest;
+
+struct SectionData {
+    SectionType type;
+    std::vector<std::byte> bytes;
+    Hash hash{};
+};
+
+std::vector<std::byte> bytes_of(std::span<const float> values) {
+    const auto raw = std::as_bytes(values);
+    return {raw.begin(), raw.end()};
+}
+
+std::vector<std::byte> bytes_of(std::span<const std::string_view> names) {
+    std::vector<std::byte> bytes;
+    for (const std::string_view name : names) {
+        const auto raw = std::as_bytes(std::span(name));
+        bytes.insert(bytes.end(), raw.begin(), raw.end());
+        bytes.push_back(std::byte{'\n'});
+    }
+    return bytes;
+}
+
+std::vector<SectionData> sections_of(const SolvePack& pack, HashFunction hash) {
+    std::vector<SectionData> out;
+    const auto add = [&](SectionType type, std::vector<std::byte> bytes) {
+        out.push_back({type, std::move(bytes), {}});
+        hash(out.back().bytes, out.back().hash);
+    };
+    add(SectionType::kNeutral, bytes_of(pack.neutral_mm));
+    add(SectionType::kBasis, bytes_of(pack.basis_mm));
+    add(SectionType::kWeightLow, bytes_of(pack.weight_low));
+    add(SectionType::kWeightHigh, bytes_of(pack.weight_high));
+    add(SectionType::kPriorMean, bytes_of(pack.prior_mean));
+    add(SectionType::kPriorSigma, bytes_of(pack.prior_sigma));
+    add(SectionType::kTemporalGamma, bytes_of(pack.temporal_gamma));
+    const std::span shape_names(pack.shape_names);
+    const std::span marker_names(pack.marker_names);
+    add(SectionType::kShapeNames,
+        bytes_of(shape_names.first(std::min<std::size_t>(pack.shape_count, kMaxShapes))));
+    add(SectionType::kMarkerNames,
+        bytes_of(marker_names.first(std::min<std::size_t>(pack.marker_count, kMaxMarkers))));
+    if (pack.solver == SolverKind::kRbf) {
+        add(SectionType::kRbfMean, bytes_of(pack.rbf.mean_mm));
+        add(SectionType::kRbfBasis, bytes_of(pack.rbf.basis));
+        add(SectionType::kRbfCentres, bytes_of(pack.rbf.centres));
+        add(SectionType::kRbfWidths, bytes_of(pack.rbf.widths_mm));
+        add(SectionType::kRbfWeights, bytes_of(pack.rbf.weights));
+        add(SectionType::kRbfOffset, bytes_of(pack.rbf.offset));
+    }
+    return out;
+}
+
+fb::Camera stored_camera(const CameraModel& camera) {
+    std::array<double, 9> rotation{};
+    for (std::size_t i = 0; i < 9; ++i) {
+        rotation[i] = camera.camera_from_headset(static_cast<int>(i) / 3, static_cast<int>(i) % 3);
+    }
+    const std::array<double, 3> centre{camera.centre_mm[0], camera.centre_mm[1], camera.centre_mm[2]};
+    return {static_cast<std::uint32_t>(camera.width_px),
+            static_cast<std::uint32_t>(camera.height_px),
+            camera.fx_px,
+            camera.fy_px,
+            camera.cx_px,
+            camera.cy_px,
+            camera.k1,
+            camera.k2,
+            camera.p1,
+            camera.p2,
+            camera.k3,
+            flatbuffers::span<const double, 9>(rotation.data(), rotation.size()),
+            flatbuffers::span<const double, 3>(centre.data(), centre.size())};
+}
+
+// A version 8 UUID (RFC 9562: contents are ours to choose) of the contents.
+std::array<std::uint8_t, 16> uuid_of(const std::vector<SectionData>& sections, const PackIdentity& identity) {
+    std::vector<std::byte> all;
+    const auto add = [&](ByteSpan part) { all.insert(all.end(), part.begin(), part.end()); };
+    add(std::as_bytes(std::span(identity.name)));
+    add(std::as_bytes(std::span(&identity.pack_version, 1)));
+    for (const SectionData& section : sections) add(section.hash);
+    Hash digest{};
+    sha256(all, digest);
+    std::array<std::uint8_t, 16> uuid{};
+    std::memcpy(uuid.data(), digest.data(), uuid.size());
+    uuid[6] = static_cast<std::uint8_t>((uuid[6] & 0x0f) | 0x80);
+    uuid[8] = static_cast<std::uint8_t>((uuid[8] & 0x3f) | 0x80);
+    return uuid;
+}
+
+std::vector<fb::Section> table_of(const std::vector<SectionData>& sections, std::uint64_t manifest_bytes) {
+    std::vector<fb::Section> table;
+    std::uint64_t end = kPackHeaderBytes + manifest_bytes;
+    for (const SectionData& section : sections) {
+        const std::uint64_t offset = align_up(end);
+        const flatbuffers::span<const std::uint8_t, kHashBytes> hash(
+            reinterpret_cast<const std::uint8_t*>(section.hash.data()), kHashBytes);
+        table.emplace_back(static_cast<std::uint16_t>(section.type), std::uint16_t{0}, 0U, offset,
+                           std::uint64_t{section.bytes.size()}, hash);
+        end = offset + section.bytes.size();
+    }
+    return table;
+}
+
+std::vector<std::byte> manifest_of(const SolvePack& pack, const PackIdentity& identity,
+                                   const std::vector<SectionData>& sections, std::uint64_t manifest_bytes) {
+    const std::vector<fb::Section> table = table_of(sections, manifest_bytes);
+    const std::uint64_t total = table.back().offset() + table.back().length();
+    flatbuffers::FlatBufferBuilder builder;
+    builder.ForceDefaults(true);  // the length must not depend on the values
+    const auto uuid_bytes = uuid_of(sections, identity);
+    const fb::Uuid uuid(flatbuffers::span<const std::uint8_t, 16>(uuid_bytes.data(), uuid_bytes.size()));
+    std::vector<fb::Camera> cameras;
+    for (std::size_t c = 0; c < pack.camera_count; ++c) cameras.push_back(stored_camera(pack.cameras[c]));
+    const auto name = builder.CreateString(identity.name);
+    const auto boards = builder.CreateVectorOfStrings(identity.boards);
+    const auto camera_vector = builder.CreateVectorOfStructs(cameras);
+    const auto section_vector = builder.CreateVectorOfStructs(table);
+    fb::ManifestBuilder manifest(builder);
+    manifest.add_uuid(&uuid);
+    manifest.add_name(name);
+    manifest.add_pack_version(identity.pack_version);
+    manifest.add_security_counter(identity.security_counter);
+    manifest.add_solver_abi_min(kSolverAbi);
+    manifest.add_solver_abi_max(kSolverAbi);
+    manifest.add_boards(boards);
+    manifest.add_memory_bytes((total + 4095) / 4096 * 4096);  // whole pages of the mapped file
+    manifest.add_solver(static_cast<std::uint8_t>(pack.solver));
+    manifest.add_marker_count(pack.marker_count);
+    manifest.add_shape_count(pack.shape_count);
+    manifest.add_rbf_dimension_count(pack.rbf.dimension_count);
+    manifest.add_rbf_centre_count(pack.rbf.centre_count);
+    manifest.add_rate_hz(pack.rate_hz);
+    manifest.add_noise_mm(pack.noise_mm);
+    manifest.add_sparsity_mm2(pack.sparsity_mm2);
+    manifest.add_ridge_mm2(pack.ridge_mm2);
+    manifest.add_cameras(camera_vector);
+    manifest.add_sections(section_vector);
+    fb::FinishManifestBuffer(builder, manifest.Finish());
+    const auto raw = std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize()));
+    return {raw.begin(), raw.end()};
+}
+
+Result<void, FileError> write_beside_and_rename(const std::filesystem::path& path, ByteSpan bytes) {
+    std::filesystem::path beside = path;
+    beside += ".part";
+    {
+        std::ofstream out(beside, std::ios::binary | std::ios::trunc);
+        out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+        out.flush();
+        if (!out) {
+            return failure(FileError{fmt::format(
+                "{}: cannot be written; does the folder exist and is there space?", beside.string())});
+        }
+    }
+    std::error_code fault;
+    std::filesystem::rename(beside, path, fault);
+    if (fault)
+        return failure(FileError{fmt::format("{}: cannot be written: {}", path.string(), fault.message())});
+    return {};
+}
+
+}  // namespace
+
+std::vector<std::byte> write_pack(const SolvePack& pack, const PackIdentity& identity, HashFunction hash) {
+    const std::vector<SectionData> sections = sections_of(pack, hash);
+    // Offsets depend on the manifest's length, and that not on their values: the second pass has the length
+    // of the first.
+    const std::size_t manifest_bytes = manifest_of(pack, identity, sections, 0).size();
+    const std::vector<std::byte> manifest = manifest_of(pack, identity, sections, manifest_bytes);
+    const std::vector<fb::Section> table = table_of(sections, manifest.size());
+    std::vector<std::byte> out(table.back().offset() + table.back().length());
+    const MutableByteSpan file(out);
+    std::memcpy(out.data(), kPackMagic.data(), kPackMagic.size());
+    store(file, 8, kPackFormatVersion);
+    store(file, 12, static_cast<std::uint32_t>(manifest.size()));
+    store(file, 16, std::uint64_t{out.size()});
+    Hash manifest_hash{};
+    hash(manifest, manifest_hash);
+    store(file, 32, manifest_hash);
+    std::ranges::copy(manifest, out.begin() + kPackHeaderBytes);
+    for (std::size_t i = 0; i < sections.size(); ++i) {
+        std::ranges::copy(sections[i].bytes, out.begin() + static_cast<std::ptrdiff_t>(table[i].offset()));
+    }
+    return out;
+}
+
+Result<void, FileError> save_pack(const std::filesystem::path& path, const SolvePack& pack,
+                                  const PackIdentity& identity) {
+    const std::vector<std::byte> bytes = write_pack(pack, identity, sha256);
+    if (const auto opened = open_pack_copy(bytes, path.string()); !opened) {
+        return failure(
+            FileError{fmt::format("{} would not be usable and was not written", opened.error().message)});
+    }
+    return write_beside_and_rename(path, bytes);
+}
+
+}  // namespace rig::host

@@ -1,0 +1,33 @@
+// Small valid packs, made by arithmetic, for every test that needs one. Their numbers mean nothing.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/pack/solve_pack.hpp"
+
+namespace rig::test {
+
+struct SamplePackSize {
+    std::uint16_t markers = 4;
+    std::uint16_t shapes = 2;
+    SolverKind solver = SolverKind::kBoxQp;
+    std::uint16_t rbf_dimensions = 2;  // used by SolverKind::kRbf only
+    std::uint16_t rbf_centres = 3;
+    std::uint8_t cameras = 1;
+};
+
+// Owns the numbers; `view` points into them, so the object does not move.
+class SamplePack {
+  public:
+    explicit SamplePack(const SamplePackSize& size);
+    SamplePack(const SamplePack&) = delete;
+    SamplePack& operator=(const SamplePack&) = delete;
+
+    SolvePack view;
+    std::vector<float> neutral, basis, low, high, mean, sigma, gamma;
+    std::vector<float> rbf_mean, rbf_basis, rbf_centres, rbf_widths, rbf_weights, rbf_offset;
+    std::vector<std::string> names;  // shapes, then markers
+};
+
+}  // namespace rig::test
