@@ -21,6 +21,7 @@ constexpr int kOpenCover = 112;    // a moat pixel darker than this is no backgr
 constexpr int kCorePercent = 30;   // of the blob's pixels are darker than its core: clear of noise, glints and edge
 constexpr double kDeepBadness = 0.25;   // of a marker that only shows at the deep outline
 constexpr double kAspectBadness = 0.3;  // of the flattest disc
+constexpr double kNoiseDeviationPx = 1.0;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
 constexpr double kSureSnr = 6.0;        // contrast / spread of the surroundings: less costs
 constexpr int kMinRing = 12;       // pixels that can carry a plane
 constexpr int kRounds = 2;         // outline -> background -> outline
@@ -379,8 +380,9 @@ void judge(const BlobWorkspace& w, const Moments& m, const PlaneFit& fit, const 
     blob.deviation = outline_deviation_px(w, m, radius);
     blob.open = open_part(w);
     const double aspect = blob.long_axis_px / blob.short_axis_px;
-    const double deviation_limit = limits.max_deviation_px + limits.max_deviation * radius;
-    const double snr = blob.contrast / std::max(1.0, fit.rms);
+    const double noise = std::max(1.0, fit.rms) / blob.contrast;
+    const double deviation_limit = limits.max_deviation_px + limits.max_deviation * radius + kNoiseDeviationPx * noise;
+    const double snr = 1.0 / noise;
     blob.badness = blob.deviation / deviation_limit + blob.open / limits.max_open +
                    kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) + std::max(0.0, kSureSnr - snr) / kSureSnr;
     blob.rejection = Rejection::kNone;

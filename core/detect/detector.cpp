@@ -101,7 +101,7 @@ Result<void, DetectorError> Detector::configure(const DetectorConfig& config) {
         return failure(DetectorError::kContrast);
     }
     if (!in_range(blob.max_aspect, 1.01, 100.0) || !in_range(blob.max_deviation, 0.0, 1.0) || !in_range(blob.max_deviation_px, 0.01, 10.0) ||
-        !in_range(blob.max_open, 0.01, 1.0) || !in_range(config.size_ratio, 1.01, 100.0) || !in_range(config.depth_spread, 0.01, 100.0) || config.size_quorum < 3) {
+        !in_range(blob.max_open, 0.01, 1.0) || !in_range(config.size_ratio, 1.01, 100.0) || !in_range(config.ink_spread, 0.01, 100.0) || !in_range(config.retro_spread, 0.01, 100.0) || config.size_quorum < 3) {
         return failure(DetectorError::kShape);
     }
     if (!in_range(config.min_score, 0.0, 1.0)) return failure(DetectorError::kScore);
@@ -193,7 +193,7 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
         if (!w.failed.push_back(static_cast<std::uint16_t>(c))) result.report.blobs_full = true;
     }
     split_failed(image, means, side, result);
-    apply_population(result);
+    apply_population(side, result);
 }
 
 // Blobs that are no markers may hold some: a marker hangs together with a shadow, a strip of light or another marker.
@@ -281,9 +281,10 @@ double Detector::usual_depth(const Blobs& blobs) const {
 
 // The markers of one image are of one make: sizes and depths of ink far from the median are eyes, nostrils, teeth,
 // moles or shadows. Without enough sure markers nothing is said.
-void Detector::apply_population(SideResult& result) const {
+void Detector::apply_population(Side side, SideResult& result) const {
     const double size = usual_size(result.blobs);
     const double depth = usual_depth(result.blobs);
+    const double spread = side == Side::kBelow ? config_.ink_spread : config_.retro_spread;
     result.quality = 0.0;
     for (Blob& blob : result.blobs) {
         if (size > 0.0) {
@@ -291,7 +292,7 @@ void Detector::apply_population(SideResult& result) const {
             blob.badness += std::max(0.0, ratio - 1.0) / (config_.size_ratio - 1.0);
         }
         if (depth > 0.0 && blob.depth < depth) {
-            blob.badness += (depth - blob.depth) / (depth * config_.depth_spread);
+            blob.badness += (depth - blob.depth) / (depth * spread);
         }
         blob.score = std::clamp(1.0 - blob.badness / kHopelessBadness, 0.0, 1.0);
         result.quality += blob.score * std::min(1.0, blob.contrast / 40.0);

@@ -22,7 +22,8 @@ struct DetectorConfig {
     double relative_contrast = 0.25;    // of the background, that a pixel needs to belong to a candidate
     double min_score = 0.15;            // 0..1, below which a blob is not handed on
     double size_ratio = 1.75;           // long axis against the median of the image: one unit of badness
-    double depth_spread = 0.6;          // part of the median depth that a marker may lack: one unit of badness
+    double ink_spread = 0.6;            // part of the median depth that a dark marker may lack: one unit of badness;
+    double retro_spread = 1.2;          // of a bright one, whose return falls with the angle
     std::uint16_t size_quorum = 8;      // markers needed before that median says anything
     double dark_luma = 4.0;             // mean grey level below which the image is called dark (F13)
     double saturated_fraction = 0.25;   // of 255s, above which it is called flooded (F13)
@@ -122,7 +123,7 @@ class Detector {
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
     [[nodiscard]] double usual_size(const Blobs& blobs) const;
     [[nodiscard]] double usual_depth(const Blobs& blobs) const;
-    void apply_population(SideResult& result) const;
+    void apply_population(Side side, SideResult& result) const;
     void decide(std::size_t dark_or_bright);
     void hand_on(const SideResult& result, Observations& observations, DetectorReport& report) const;
 
