@@ -18,6 +18,7 @@ inline constexpr int kExitInterrupted = 130;
 // Declared one a line, in alphabetical order.
 void add_detect_verb(CLI::App& app, int& exit_code);
 void add_solve_verb(CLI::App& app, int& exit_code);
+void add_world_verb(CLI::App& app, int& exit_code);
 
 void add_all_verbs(CLI::App& app, int& exit_code);
 
