@@ -21,6 +21,7 @@ void add_detect_verb(CLI::App& app, int& exit_code);
 void add_pack_verb(CLI::App& app, int& exit_code);
 void add_solve_verb(CLI::App& app, int& exit_code);
 void add_train_verb(CLI::App& app, int& exit_code);
+void add_world_verb(CLI::App& app, int& exit_code);
 
 void add_all_verbs(CLI::App& app, int& exit_code);
 
