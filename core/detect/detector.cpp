@@ -10,6 +10,7 @@ namespace rig {
 
 namespace {
 
+constexpr int kCorePixels = 3;  // beyond one and a half thresholds
 constexpr std::array<double, 2> kSplitDepths = {0.5, 0.75};  // of a component's own contrast
 
 // The least pixels a disc of the least diameter shows above mid contrast, with a margin for blur.
@@ -93,6 +94,27 @@ void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& threshold
     }
 }
 
+// Texture and noise just reach the threshold; a marker whose mid contrast does has pixels well beyond it.
+bool Detector::has_core(const ImageView& image, const BlockGrid& thresholds, Side side, std::span<const Run> runs) const {
+    const int least = static_cast<int>(config_.blob.min_contrast);
+    const int part = static_cast<int>(config_.relative_contrast * 256.0);
+    const int whole = side == Side::kBelow ? 256 - part : 256 + part;
+    const int sign = side == Side::kBelow ? 1 : -1;
+    int deep = 0;
+    for (const Run& run : runs) {
+        const std::uint8_t* pixels = image.row(run.y);
+        const std::uint8_t* levels = &thresholds.values[static_cast<std::size_t>(run.y / kBlockPx) *
+                                                        static_cast<std::size_t>(thresholds.width)];
+        for (std::size_t x = run.begin; x < run.end; ++x) {
+            const int level = levels[x / kBlockPx];
+            const int step = std::max(least, level * part / whole);
+            deep += sign * (level - pixels[x]) * 2 >= step ? 1 : 0;
+        }
+        if (deep >= kCorePixels) return true;
+    }
+    return false;
+}
+
 void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side side, SideResult& result) {
     Workspace& w = workspace_;
     result.blobs.clear();
@@ -106,7 +128,12 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     result.report.blobs_full = counts.dropped > 0;
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component component = w.components[c];
-        examine(image, side, component, std::span<const Run>(w.grouped).subspan(component.first, component.count), result);
+        const std::span<const Run> members = std::span<const Run>(w.grouped).subspan(component.first, component.count);
+        if (!has_core(image, thresholds, side, members)) {
+            ++result.report.rejected[static_cast<std::size_t>(Rejection::kFaint)];
+            continue;
+        }
+        examine(image, side, component, members, result);
     }
     apply_population(result);
 }

@@ -97,6 +97,8 @@ class Detector {
     void measure_exposure(const ImageView& image, DetectorReport& report);
     void detect_side(const ImageView& image, const BlockGrid& means, Side side, SideResult& result);
     void set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side) const;
+    [[nodiscard]] bool has_core(const ImageView& image, const BlockGrid& thresholds, Side side,
+                                std::span<const Run> runs) const;
     void examine(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,
                  SideResult& result);
     void split(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,

@@ -5,6 +5,7 @@ namespace rig::host {
 void add_all_verbs(CLI::App& app, int& exit_code) {
     // one call a line, in the order in which a newcomer meets them
     add_detect_verb(app, exit_code);
+    add_solve_verb(app, exit_code);
 }
 
 }  // namespace rig::host
