@@ -4,93 +4,33 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
-#include <span>
 
-#include "core/base/face_state.hpp"
-#include "core/base/linalg.hpp"
 #include "core/base/result.hpp"
-#include "core/detect/observation.hpp"
-#include "core/image/view.hpp"
+#include "core/detect/detector.hpp"
+#include "core/filter/one_euro.hpp"
+#include "core/filter/recovery_blend.hpp"
+#include "core/infer/inference.hpp"
 #include "core/pack/solve_pack.hpp"
-#include "core/track/named_markers.hpp"
+#include "core/pipeline/frame_types.hpp"
+#include "core/pipeline/ladder.hpp"
+#include "core/solve/solver.hpp"
+#include "core/stabilise/stabiliser.hpp"
+#include "core/track/tracker.hpp"
 
 namespace rig {
 
-enum class LossPolicy : std::uint8_t { kHold = 0, kDecay = 1 };
+enum class PipelineError : std::uint8_t { kPackLimits, kRate };
 
-struct PipelineConfig {
-    bool stabilise = true;       // false: input is already in the face frame
-    bool filter = true;          // smoothing and recovery blends; a temporal prior in the pack stays on either way
-    LossPolicy loss_policy = LossPolicy::kHold;
-    MarkerPolarity polarity = MarkerPolarity::kAuto;
-    double rate_hz = 60.0;
-};
-
-// One tick's images. images[c] is empty when camera c delivered nothing; status[c] then says why.
-struct FrameSet {
-    std::int64_t capture_us = 0;
-    std::array<ImageView, kMaxCameras> images{};
-    std::array<CameraStatus, kMaxCameras> status{};
-    std::uint8_t camera_count = 0;
-};
-
-// One tick's observations as detection reported them, for re-solving a recorded take.
-struct ObservationFrame {
-    std::int64_t capture_us = 0;
-    std::array<std::span<const Observation>, kMaxCameras> cameras{};
-    std::array<CameraStatus, kMaxCameras> status{};
-    std::uint8_t camera_count = 0;
-};
-
-// One tick of a labelled marker stream: entry k is marker k of the pack; a non-finite coordinate means not seen.
-struct LabelledFrame {
-    std::int64_t capture_us = 0;
-    std::span<const Vec3> positions_mm;
-};
-
-// One tick of an unlabelled stream: points in any order, ghosts among them; a non-finite point is an empty slot.
-struct PointFrame {
-    std::int64_t capture_us = 0;
-    std::span<const Vec3> positions_mm;
-};
-
-struct FrameReport {
-    // solve certificate
-    double kkt = 0.0;              // largest move of a projected Jacobi step; dimensionless
-    double objective_mm2 = 0.0;    // E at the answer
-    std::uint16_t iterations = 0;
-    std::uint16_t markers_used = 0;
-    double residual_rms_mm = 0.0;  // over the coordinates of the markers used
-    bool optimal = false;          // false: the iteration cap ended the solve at a feasible point
-    // identity
-    std::array<std::uint16_t, kMaxCameras> observations{};  // detected per camera
-    std::uint16_t markers_seen = 0;
-    std::uint16_t swaps_repaired = 0;
-    bool bootstrapped = false;     // identities were found anew in this frame
-    std::array<std::int16_t, kMaxPoints> labels{};  // PointFrame input: the marker each point was taken for, -1 none
-    // stabilised, completed markers in the face frame, mm; [marker_count]
-    std::array<Vec3, kMaxMarkers> face_markers_mm{};
-};
-
-enum class PipelineError : std::uint8_t { kPackLimits, kPackNumbers, kNoCameras };
-
-struct PipelineState;  // every stage's config, state and workspace
-
-// About 20 MB, all of it inside the object's one allocation made by the constructor; step() and idle() never allocate.
-// The pack's bytes must outlive it. One thread uses a pipeline.
+// About 30 MB, all of it inside the object: a program places it before seal(), never on a stack. step() and idle() never
+// allocate. The pack's bytes outlive it. One thread uses a pipeline.
 class Pipeline {
   public:
-    Pipeline();
-    ~Pipeline();
-    Pipeline(const Pipeline&) = delete;
-    Pipeline& operator=(const Pipeline&) = delete;
-
-    // Validates everything once; on failure the pipeline stays in SAFE and every step yields the rest pose.
+    // `pack` as open_pack() returned it: its numbers are checked already. On failure, and before the first success, the
+    // pipeline is in SAFE and every step yields the rest pose.
     [[nodiscard]] Result<void, PipelineError> configure(const SolvePack& pack, const PipelineConfig& config);
 
-    // One tick each. `state` and `report` are overwritten. state.age_us and state.sequence: sequence is counted here,
-    // age is the caller's to fill when it encodes.
+    // One tick each; `state` and `report` are overwritten. state.sequence is counted here; state.age_us is the
+    // caller's to fill when it encodes.
     void step(const FrameSet& frame, FaceState& state, FrameReport& report);
     void step(const ObservationFrame& frame, FaceState& state, FrameReport& report);
     void step(const LabelledFrame& frame, FaceState& state, FrameReport& report);
@@ -98,15 +38,73 @@ class Pipeline {
     // A tick for which no input arrived at all.
     void idle(std::int64_t now_us, FaceState& state, FrameReport& report);
 
-    // Forgets identities and slip; the next frames find them anew.
+    // Forgets identities, slip and the temporal prior; the next frames find them anew.
     void reset_tracking();
 
     // Of the last step, for recording and pictures.
-    [[nodiscard]] const Observations& observations(std::size_t camera) const;
-    [[nodiscard]] const NamedMarkers& named_markers() const;
+    [[nodiscard]] const Observations& observations(std::size_t camera) const { return observations_[camera]; }
+    [[nodiscard]] const NamedMarkers& named_markers() const { return named_; }
+    // Which observation of each camera each marker was taken for, -1 none.
+    [[nodiscard]] const Matches& matches() const { return track_report_.matches; }
+    [[nodiscard]] const DetectorReport& detector_report(std::size_t camera) const { return detector_reports_[camera]; }
 
   private:
-    std::unique_ptr<PipelineState> state_;
+    void configure_stages(const PipelineConfig& config);
+    void begin(std::int64_t capture_us, FaceState& state, FrameReport& report);
+    void take_observations(std::size_t camera, std::span<const Observation> observations, FrameReport& report);
+    void track_sightings(FrameReport& report);
+    void solve_named(std::int64_t capture_us, FrameReport& report);
+    void finish(std::int64_t capture_us, bool usable, FaceState& state, FrameReport& report);
+    void put_out(std::int64_t capture_us, bool usable, FaceState& state);
+    void hold(std::int64_t capture_us, FaceState& state);
+    void raise_faults(bool usable, const FrameReport& report, FaceState& state) const;
+    [[nodiscard]] bool is_partial(const FaceState& state) const;
+
+    bool configured_ = false;
+    PipelineConfig config_;
+    SolvePack pack_;
+    ShapeModel model_;
+    ShapeModelWorkspace model_workspace_;
+    std::array<double, kMaxCameras> camera_depth_mm_{};
+
+    std::array<Detector, kMaxCameras> detectors_;
+    std::array<DetectorReport, kMaxCameras> detector_reports_{};
+    std::array<Observations, kMaxCameras> observations_{};
+    SightingSet sightings_;
+
+    TrackerConfig tracker_config_;
+    TrackerState tracker_;
+    TrackerWorkspace tracker_workspace_;
+    TrackerReport track_report_;
+    NamedMarkers named_;
+
+    StabiliserConfig stabiliser_config_;
+    StabiliserState stabiliser_;
+    StabiliserWorkspace stabiliser_workspace_;
+    StabiliserOutput stabilised_;
+    StabiliserReport stabiliser_report_;
+
+    InferenceOutput completed_;
+
+    SolverConfig solver_config_;
+    SolverState solver_;
+    SolverWorkspace solver_workspace_;
+    SolverOutput solved_;
+    SolverReport solver_report_;
+
+    OneEuroConfig smoothing_config_;
+    OneEuroState smoothing_;
+    RecoveryConfig recovery_config_;
+    RecoveryState recovery_;
+    LadderConfig ladder_config_;
+    LadderState ladder_;
+    bool was_live_ = false;
+
+    std::uint32_t sequence_ = 0;
+    std::int64_t last_solved_us_ = 0;
+    std::array<double, kMaxShapes> smoothed_{};
+    std::array<double, kMaxShapes> sent_{};  // the weights last put out
+    std::array<double, kMaxShapes> lost_from_{};  // ... when the face was lost: where the decay to rest starts
 };
 
 }  // namespace rig

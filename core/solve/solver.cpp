@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/base/dense.hpp"
 #include "core/base/math.hpp"
 
 namespace rig {
@@ -50,12 +49,10 @@ double gamma_scale(const SolverConfig& config, const SolverState& state, std::in
     return 1.0 / std::max(1.0, gap_s * config.rate_hz);
 }
 
-// Weights of the markers seen: P = (B^T V B / s^2 + P0^-1)^-1, without the active set, so that hiding a marker can only
-// lower a confidence.
+// Confidence depends on what is seen, not on where it is, so it is kept until that changes.
 void update_confidence(const SolverConfig& config, const StabiliserOutput& stabilised, SolverState& state,
                        SolverWorkspace& w) {
     const SolvePack& pack = config.pack;
-    const std::size_t n = pack.shape_count;
     bool same = state.has_confidence;
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         const std::uint8_t seen = stabilised.markers[k].seen ? 1 : 0;
@@ -63,22 +60,9 @@ void update_confidence(const SolverConfig& config, const StabiliserOutput& stabi
         state.pattern[k] = seen;
     }
     if (same) return;
-    const double s2 = static_cast<double>(pack.noise_mm) * static_cast<double>(pack.noise_mm);
-    for (std::size_t i = 0; i < n; ++i) {
-        const double sigma = static_cast<double>(pack.prior_sigma[i]);
-        for (std::size_t j = 0; j < i; ++j) {
-            w.posterior[i * kMaxShapes + j] = w.equations.hessian[i * kMaxShapes + j] / s2;
-        }
-        w.posterior[i * kMaxShapes + i] = w.equations.data_diagonal[i] / s2 + 1.0 / (sigma * sigma);
-    }
-    state.confidence.fill(0.0F);
-    if (cholesky(w.posterior.data(), w.posterior.data(), n, kMaxShapes)) {
-        inverse_diagonal(w.posterior.data(), n, kMaxShapes, w.diagonal.data(), w.scratch.data());
-        for (std::size_t i = 0; i < n; ++i) {
-            const double left = std::sqrt(w.diagonal[i]) / static_cast<double>(pack.prior_sigma[i]);
-            state.confidence[i] = static_cast<float>(std::clamp(1.0 - left, 0.0, 1.0));
-        }
-    }
+    const ConfidenceInput input{w.equations.hessian, w.equations.data_diagonal, pack.prior_sigma,
+                                static_cast<double>(pack.noise_mm)};
+    weight_confidence(input, w.confidence, state.confidence);
     state.has_confidence = true;
 }
 
@@ -110,10 +94,16 @@ void run_rbf(const SolverConfig& config, const InferenceOutput& completed, Solve
 
 }  // namespace
 
-void configure_solver(const SolvePack& pack, double rate_hz, SolverConfig& config) {
+void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& workspace, SolverConfig& config) {
     config.pack = pack;
     config.rate_hz = rate_hz;
     build_normal_tables(pack, config.tables);
+    for (std::size_t i = 0; i < pack.shape_count; ++i) {
+        workspace.equations.data_diagonal[i] = config.tables.full_gram[i * kMaxShapes + i];
+    }
+    const ConfidenceInput everything{config.tables.full_gram, workspace.equations.data_diagonal, pack.prior_sigma,
+                                     static_cast<double>(pack.noise_mm)};
+    weight_confidence(everything, workspace.confidence, config.full_confidence);
 }
 
 void reset_solver(SolverState& state) {

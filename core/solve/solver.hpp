@@ -10,6 +10,7 @@
 #include "core/infer/inference.hpp"
 #include "core/pack/solve_pack.hpp"
 #include "core/solve/box_qp.hpp"
+#include "core/solve/confidence.hpp"
 #include "core/solve/normal_equations.hpp"
 #include "core/solve/rbf.hpp"
 #include "core/stabilise/stabiliser.hpp"
@@ -22,6 +23,7 @@ struct SolverConfig {
     BoxQpConfig qp;
     double rate_hz = 60.0;
     double forget_s = 0.25;  // the temporal prior starts anew after a gap of this length
+    std::array<float, kMaxShapes> full_confidence{};  // of each weight when every marker is seen
 };
 
 struct SolverState {
@@ -43,15 +45,13 @@ struct SolverWorkspace {
     std::array<Mat3, kMaxMarkers> weights{};
     std::array<double, kMaxShapes> low{};
     std::array<double, kMaxShapes> high{};
-    std::array<double, kMaxShapes * kMaxShapes> posterior{};
-    std::array<double, kMaxShapes> diagonal{};
-    std::array<double, kMaxShapes> scratch{};
+    ConfidenceWorkspace confidence;
     std::array<float, kMaxRows> flat_mm{};
 };
 
 struct SolverOutput {
     std::array<double, kMaxShapes> weights{};     // inside [low, high] of the pack
-    std::array<float, kMaxShapes> confidence{};   // 0..1: 1 - sqrt(P_ii / P0_ii), methods.md section 3
+    std::array<float, kMaxShapes> confidence{};   // 0..1, see confidence.hpp
 };
 
 struct SolverReport {
@@ -65,7 +65,8 @@ struct SolverReport {
     double hull_distance = 0.0;    // RBF: distance to the nearest centre, in that centre's widths
 };
 
-void configure_solver(const SolvePack& pack, double rate_hz, SolverConfig& config);
+// Not for frames: the workspace is only scratch here.
+void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& workspace, SolverConfig& config);
 void reset_solver(SolverState& state);
 
 void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const InferenceOutput& completed,

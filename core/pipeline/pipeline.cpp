@@ -1,0 +1,313 @@
+#include "core/pipeline/pipeline.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/check.hpp"
+#include "core/base/math.hpp"
+
+namespace rig {
+
+namespace {
+
+constexpr double kCentreSigmaPx = 0.15;             // of a detected centre: measured on rendered frames, blur and noise
+constexpr double kNominalDepthMm = 200.0;           // helmet camera to face, when the calibration does not tell
+constexpr std::int64_t kDecayUs = 400'000;          // to the rest pose, policy kDecay
+constexpr double kSlipAlarmRad = 0.07;              // about 4 degrees: re-seat the rig
+constexpr double kSlipAlarmMm = 8.0;
+constexpr float kObservable = 0.5F;                 // confidence, everything visible, from which a shape counts as seen
+constexpr float kPartialShare = 0.5F;               // of that confidence, under which its region is not seen any more
+
+bool usable_status(CameraStatus status) {
+    return status == CameraStatus::kGood || status == CameraStatus::kExposure;
+}
+
+double rest(const SolvePack& pack, std::size_t i) {
+    return std::clamp(0.0, static_cast<double>(pack.weight_low[i]), static_cast<double>(pack.weight_high[i]));
+}
+
+void write_slip(const Rigid& pose, Slip& slip) {
+    const Vec3 turn = vector_from_rotation(pose.rotation);
+    for (std::size_t i = 0; i < 3; ++i) {
+        slip.rotation_rad[i] = static_cast<float>(turn[static_cast<Eigen::Index>(i)]);
+        slip.translation_mm[i] = static_cast<float>(pose.translation_mm[static_cast<Eigen::Index>(i)]);
+    }
+}
+
+}  // namespace
+
+Result<void, PipelineError> Pipeline::configure(const SolvePack& pack, const PipelineConfig& config) {
+    configured_ = false;
+    const bool counts = pack.marker_count >= kMinMarkers && pack.marker_count <= kMaxMarkers &&
+                        pack.shape_count >= 1 && pack.shape_count <= kMaxShapes && pack.camera_count <= kMaxCameras;
+    const std::size_t rows = 3U * pack.marker_count;
+    if (!counts || pack.neutral_mm.size() != rows || pack.basis_mm.size() != rows * pack.shape_count) {
+        return failure(PipelineError::kPackLimits);
+    }
+    if (!(config.rate_hz >= 1.0 && config.rate_hz <= 1000.0)) return failure(PipelineError::kRate);
+    config_ = config;
+    pack_ = pack;
+    build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, model_workspace_, model_);
+    configure_solver(pack, config.rate_hz, solver_workspace_, solver_config_);
+    configure_stages(config);
+    for (std::size_t i = 0; i < pack.shape_count; ++i) sent_[i] = rest(pack, i);
+    reset_tracking();
+    ladder_ = LadderState{};
+    was_live_ = false;
+    configured_ = true;
+    return {};
+}
+
+void Pipeline::configure_stages(const PipelineConfig& config) {
+    DetectorConfig detector;
+    detector.polarity = config.polarity;
+    for (Detector& each : detectors_) {
+        const auto accepted = each.configure(detector);
+        RIG_CHECK(accepted.has_value());
+        each.reset();
+    }
+    for (std::size_t c = 0; c < pack_.camera_count; ++c) {
+        const Vec3& centre = pack_.cameras[c].centre_mm;
+        const double distance = std::sqrt(centre.dot(centre));
+        camera_depth_mm_[c] = distance > 1.0 ? distance : kNominalDepthMm;
+    }
+    tracker_config_ = TrackerConfig{};
+    tracker_config_.rate_hz = config.rate_hz;
+    stabiliser_config_ = StabiliserConfig{};
+    stabiliser_config_.enabled = config.stabilise;
+    smoothing_config_ = OneEuroConfig{};
+    smoothing_config_.rate_hz = config.rate_hz;
+    smoothing_config_.low = pack_.weight_low;
+    smoothing_config_.high = pack_.weight_high;
+    recovery_config_ = RecoveryConfig{};
+    recovery_config_.rate_hz = config.rate_hz;
+    recovery_config_.low = pack_.weight_low;
+    recovery_config_.high = pack_.weight_high;
+    recovery_config_.good_frames = 1;  // the ladder has counted already
+    ladder_config_ = LadderConfig{};
+    ladder_config_.rate_hz = config.rate_hz;
+}
+
+void Pipeline::reset_tracking() {
+    reset_tracker(tracker_);
+    reset_stabiliser(stabiliser_);
+    reset_solver(solver_);
+    reset_one_euro(smoothing_);
+}
+
+void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& report) {
+    report = FrameReport{};
+    report.labels.fill(-1);
+    state = FaceState{};
+    state.sequence = sequence_++;
+    state.capture_us = capture_us;
+    state.shape_count = configured_ ? pack_.shape_count : std::uint16_t{0};
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+        state.cameras[c] = c < pack_.camera_count && configured_ ? CameraStatus::kMissing : CameraStatus::kUnused;
+    }
+    sightings_.clear();
+    named_.capture_us = capture_us;
+}
+
+void Pipeline::take_observations(std::size_t camera, std::span<const Observation> observations, FrameReport& report) {
+    report.observations[camera] = static_cast<std::uint16_t>(observations.size());
+    add_camera_view(pack_.cameras[camera], observations, kCentreSigmaPx, camera_depth_mm_[camera], sightings_);
+}
+
+void Pipeline::track_sightings(FrameReport& report) {
+    track(model_, tracker_config_, sightings_, tracker_, tracker_workspace_, named_, track_report_);
+    report.markers_seen = track_report_.seen;
+    report.swaps_repaired = track_report_.swaps_repaired;
+    report.names_rejected = track_report_.rejected;
+    report.bootstrapped = track_report_.bootstrapped;
+}
+
+void Pipeline::step(const FrameSet& frame, FaceState& state, FrameReport& report) {
+    begin(frame.capture_us, state, report);
+    bool any = false;
+    for (std::size_t c = 0; c < pack_.camera_count && configured_; ++c) {
+        observations_[c].clear();
+        CameraStatus status = c < frame.camera_count ? frame.status[c] : CameraStatus::kMissing;
+        if (usable_status(status) && frame.images[c].empty()) status = CameraStatus::kMissing;
+        if (usable_status(status)) {
+            detectors_[c].detect(frame.images[c], observations_[c], detector_reports_[c]);
+            if (detector_reports_[c].exposure != 0) status = CameraStatus::kExposure;
+            state.faults |= detector_reports_[c].faults;
+            any = true;
+        }
+        state.cameras[c] = status;
+        take_observations(c, observations_[c].span(), report);
+    }
+    if (any) track_sightings(report);
+    const bool usable = any && track_report_.tracking;
+    if (usable) solve_named(frame.capture_us, report);
+    finish(frame.capture_us, usable && solver_report_.solved, state, report);
+}
+
+void Pipeline::step(const ObservationFrame& frame, FaceState& state, FrameReport& report) {
+    begin(frame.capture_us, state, report);
+    bool any = false;
+    for (std::size_t c = 0; c < pack_.camera_count && configured_; ++c) {
+        observations_[c].clear();
+        const CameraStatus status = c < frame.camera_count ? frame.status[c] : CameraStatus::kMissing;
+        state.cameras[c] = status;
+        if (status == CameraStatus::kExposure) state.faults |= fault_bit(Fault::kExposure);
+        if (usable_status(status)) {
+            any = true;
+            for (const Observation& observation : frame.cameras[c]) {
+                if (!observations_[c].push_back(observation)) break;
+            }
+        }
+        take_observations(c, observations_[c].span(), report);
+    }
+    if (any) track_sightings(report);
+    const bool usable = any && track_report_.tracking;
+    if (usable) solve_named(frame.capture_us, report);
+    finish(frame.capture_us, usable && solver_report_.solved, state, report);
+}
+
+void Pipeline::step(const LabelledFrame& frame, FaceState& state, FrameReport& report) {
+    begin(frame.capture_us, state, report);
+    bool usable = configured_ && frame.positions_mm.size() == pack_.marker_count;
+    if (usable) {
+        check_names(model_, tracker_config_, frame.positions_mm, static_cast<double>(pack_.noise_mm), tracker_,
+                    tracker_workspace_, sightings_, named_, track_report_);
+        report.markers_seen = track_report_.seen;
+        report.swaps_repaired = track_report_.swaps_repaired;
+        report.names_rejected = track_report_.rejected;
+        usable = track_report_.seen >= kMinMarkers;
+    }
+    if (usable) solve_named(frame.capture_us, report);
+    finish(frame.capture_us, usable && solver_report_.solved, state, report);
+}
+
+void Pipeline::step(const PointFrame& frame, FaceState& state, FrameReport& report) {
+    begin(frame.capture_us, state, report);
+    bool usable = configured_ && !frame.positions_mm.empty();
+    if (usable) {
+        add_point_view(frame.positions_mm, static_cast<double>(pack_.noise_mm), sightings_);
+        track_sightings(report);
+        for (std::size_t k = 0; k < pack_.marker_count; ++k) {
+            const std::int16_t at = track_report_.matches[0][k];
+            if (at < 0) continue;
+            const std::uint16_t slot = sightings_.source[0][static_cast<std::size_t>(at)];
+            if (slot < report.labels.size()) report.labels[slot] = static_cast<std::int16_t>(k);
+        }
+        usable = track_report_.tracking;
+    }
+    if (usable) solve_named(frame.capture_us, report);
+    finish(frame.capture_us, usable && solver_report_.solved, state, report);
+}
+
+void Pipeline::idle(std::int64_t now_us, FaceState& state, FrameReport& report) {
+    begin(now_us, state, report);
+    finish(now_us, false, state, report);
+}
+
+void Pipeline::solve_named(std::int64_t capture_us, FrameReport& report) {
+    stabilise(model_, stabiliser_config_, named_, stabiliser_, stabiliser_workspace_, stabilised_, stabiliser_report_);
+    infer_missing(model_, stabilised_, completed_);
+    solve(solver_config_, stabilised_, completed_, capture_us, solver_, solver_workspace_, solved_, solver_report_);
+    report.solved = solver_report_.solved;
+    report.kkt = solver_report_.kkt;
+    report.objective_mm2 = solver_report_.objective_mm2;
+    report.iterations = solver_report_.iterations;
+    report.markers_used = solver_report_.markers_used;
+    report.residual_rms_mm = solver_report_.residual_rms_mm;
+    report.hull_distance = solver_report_.hull_distance;
+    report.optimal = solver_report_.optimal;
+    for (std::size_t k = 0; k < pack_.marker_count; ++k) report.face_markers_mm[k] = completed_.position_mm[k];
+}
+
+bool Pipeline::is_partial(const FaceState& state) const {
+    for (std::size_t c = 0; c < pack_.camera_count; ++c) {
+        // A marker stream has no cameras to miss.
+        if (sightings_.from_cameras && !usable_status(state.cameras[c])) return true;
+    }
+    for (std::size_t i = 0; i < pack_.shape_count; ++i) {
+        const float full = solver_config_.full_confidence[i];
+        if (full >= kObservable && solved_.confidence[i] < kPartialShare * full) return true;
+    }
+    return false;
+}
+
+void Pipeline::finish(std::int64_t capture_us, bool usable, FaceState& state, FrameReport& report) {
+    LadderInput input;
+    input.now_us = capture_us;
+    input.configured = configured_;
+    input.usable = usable;
+    input.partial = usable && is_partial(state);
+    step_ladder(ladder_config_, input, ladder_);
+    state.state = ladder_.state;
+    if (configured_) {
+        if (!usable && track_report_.tracking && ladder_.state == TrackingState::kLost) reset_tracking();
+        put_out(capture_us, usable, state);
+    }
+    raise_faults(usable, report, state);
+}
+
+void Pipeline::put_out(std::int64_t capture_us, bool usable, FaceState& state) {
+    const std::size_t n = pack_.shape_count;
+    const bool up = ladder_.state >= TrackingState::kPartial;
+    if (usable) {
+        OneEuroReport smoothing;
+        const std::span<const double> raw(solved_.weights.data(), n);
+        filter_one_euro(smoothing_config_, raw, capture_us, smoothing_, {smoothed_.data(), n}, smoothing);
+        const std::span<const double> wanted(config_.filter ? smoothed_.data() : solved_.weights.data(), n);
+        RecoveryReport recovery;
+        if (!config_.filter || (up && !was_live_)) {
+            // The very first face does not come back from anything; without the filter nothing is blended.
+            std::copy(wanted.begin(), wanted.end(), sent_.begin());
+            recovery_.phase = RecoveryPhase::kLive;
+            recovery.phase = RecoveryPhase::kLive;
+        } else {
+            blend_recovery(recovery_config_, up, wanted, {sent_.data(), n}, capture_us, recovery_, {sent_.data(), n},
+                           recovery);
+        }
+        was_live_ = was_live_ || up;
+        state.held = recovery.phase == RecoveryPhase::kHeld;
+        last_solved_us_ = capture_us;
+        lost_from_ = sent_;
+        write_slip(stabilised_.headset_from_face, state.slip);
+    } else {
+        hold(capture_us, state);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+        state.weights[i] = static_cast<float>(sent_[i]);
+        const bool known = ladder_.state >= TrackingState::kHold && was_live_;
+        state.confidence[i] = known ? solved_.confidence[i] : 0.0F;
+    }
+}
+
+void Pipeline::hold(std::int64_t capture_us, FaceState& state) {
+    state.held = true;
+    if (ladder_.ever_usable) state.capture_us = last_solved_us_;
+    write_slip(stabilised_.headset_from_face, state.slip);
+    if (ladder_.state <= TrackingState::kHold) reset_recovery(recovery_);
+    if (ladder_.state != TrackingState::kLost || config_.loss_policy != LossPolicy::kDecay) return;
+    const std::int64_t since_us = capture_us - last_solved_us_ - ladder_config_.lost_after_us;
+    const double left = 1.0 - std::clamp(static_cast<double>(since_us) / static_cast<double>(kDecayUs), 0.0, 1.0);
+    for (std::size_t i = 0; i < pack_.shape_count; ++i) {
+        sent_[i] = rest(pack_, i) + left * (lost_from_[i] - rest(pack_, i));
+    }
+}
+
+void Pipeline::raise_faults(bool usable, const FrameReport& report, FaceState& state) const {
+    const auto raise = [&state](bool when, Fault fault) {
+        if (when) state.faults |= fault_bit(fault);
+    };
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+        raise(state.cameras[c] == CameraStatus::kGone, Fault::kCameraGone);
+        raise(state.cameras[c] == CameraStatus::kFrozen, Fault::kCameraFrozen);
+        raise(state.cameras[c] == CameraStatus::kExposure, Fault::kExposure);
+    }
+    raise(configured_ && !usable, Fault::kMarkersLost);
+    if (!usable) return;
+    raise(state.state == TrackingState::kPartial, Fault::kMarkersMissing);
+    raise(report.swaps_repaired > 0 || report.names_rejected > 0, Fault::kMarkerSwap);
+    raise(!report.optimal, Fault::kSolveWeak);
+    raise(stabiliser_report_.slip_rotation_rad > kSlipAlarmRad || stabiliser_report_.slip_translation_mm > kSlipAlarmMm,
+          Fault::kRigMoved);
+}
+
+}  // namespace rig
