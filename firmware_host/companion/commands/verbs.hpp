@@ -17,6 +17,8 @@ inline constexpr int kExitInterrupted = 130;
 // Each add_<verb>_verb() adds its subcommand to `app` and stores its exit code in `exit_code` when it is run.
 // Declared one a line, in alphabetical order.
 void add_detect_verb(CLI::App& app, int& exit_code);
+void add_import_verb(CLI::App& app, int& exit_code);
+void add_sample_verb(CLI::App& app, int& exit_code);
 void add_solve_verb(CLI::App& app, int& exit_code);
 
 void add_all_verbs(CLI::App& app, int& exit_code);
