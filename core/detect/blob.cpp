@@ -13,11 +13,16 @@ constexpr int kFull = 256;         // cover of a pixel that is all blob
 constexpr int kHalf = kFull / 2;   // where the outline is drawn,
 constexpr int kDeep = 176;         // or here where shadow touches the marker
 constexpr int kRamp = 64;          // soft threshold: weight 0 to 1 from outline - kRamp to outline + kRamp
+constexpr double kLeastShare = 0.4;     // of the light at the centre that a pixel's background may have,
+constexpr double kGreatestShare = 2.5;  // so that a bad plane cannot run away
 constexpr int kRedrawReach = 2;    // px that a redrawn outline may lie outside the old one
 constexpr int kMoatReach = 3;      // px
 constexpr int kOpenCover = 112;    // a moat pixel darker than this is no background
 constexpr int kCorePercent = 30;   // of the blob's pixels are darker than its core: clear of noise, glints and edge
-constexpr double kDeepScore = 0.7; // what a marker in a shadow is worth
+constexpr double kDeepBadness = 0.25;   // of a marker that only shows at the deep outline
+constexpr double kAspectBadness = 0.3;  // of the flattest disc
+constexpr double kNoiseDeviationPx = 1.0;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
+constexpr double kSureSnr = 6.0;        // contrast / spread of the surroundings: less costs
 constexpr int kMinRing = 12;       // pixels that can carry a plane
 constexpr int kRounds = 2;         // outline -> background -> outline
 constexpr int kFraction = 256;     // of a grey level: fixed point of the background plane
@@ -225,8 +230,14 @@ Box box_around(const BlobWorkspace& w, int by) {
     return box;
 }
 
-// Cover of every pixel that redrawing and judging can look at, clamped to -1..2 blobs so that 16 bits hold it.
-void compute_cover(BlobWorkspace& w, const Plane& plane, double depth) {
+// Cover of every pixel that redrawing and judging can look at, clamped to -1..2 blobs so that 16 bits hold it. Paint
+// scales the light that falls on the skin, so the depth of a whole pixel of blob follows the background's gradient;
+// taking it as constant pulls centres towards the bright side (0.15 px on a shaded forehead).
+void compute_cover(BlobWorkspace& w, Side side, const Plane& plane, double depth) {
+    const double black = side == Side::kBelow ? 0.0 : 255.0;
+    const double light = side == Side::kBelow ? 1.0 : -1.0;
+    const double centre_light = std::max(1.0, light * (plane.level - black));
+    const double to_share = light / centre_light;
     const double scale = kFull / depth;
     const Box box = box_around(w, kRedrawReach + kMoatReach);
     for (int y = box.top; y < box.bottom; ++y) {
@@ -235,7 +246,8 @@ void compute_cover(BlobWorkspace& w, const Plane& plane, double depth) {
         const double row_level = plane.level + plane.slope_y * (y - plane.centre_y) - plane.slope_x * plane.centre_x;
         for (int x = box.left; x < box.right; ++x) {
             const double level = row_level + plane.slope_x * x;
-            const double c = (level - values[static_cast<std::size_t>(x)]) * scale;
+            const double share = std::clamp((level - black) * to_share, kLeastShare, kGreatestShare);
+            const double c = (level - values[static_cast<std::size_t>(x)]) * scale / share;
             cover[static_cast<std::size_t>(x)] = static_cast<std::int16_t>(std::clamp(c, -256.0, 512.0));
         }
     }
@@ -368,12 +380,11 @@ void judge(const BlobWorkspace& w, const Moments& m, const PlaneFit& fit, const 
     blob.deviation = outline_deviation_px(w, m, radius);
     blob.open = open_part(w);
     const double aspect = blob.long_axis_px / blob.short_axis_px;
-    const double deviation_limit = 0.12 + 0.05 * radius;
-    const double snr = blob.contrast / std::max(1.0, fit.rms);
-    blob.score = std::clamp(1.0 - 0.5 * blob.deviation / deviation_limit, 0.0, 1.0) *
-                 std::clamp(1.0 - 0.5 * blob.open / limits.max_open, 0.0, 1.0) * std::clamp(snr / 8.0, 0.25, 1.0) *
-                 std::clamp(1.5 - 0.5 * aspect / limits.max_aspect, 0.0, 1.0);
-    blob.score = std::min(blob.score, 1.0);
+    const double noise = std::max(1.0, fit.rms) / blob.contrast;
+    const double deviation_limit = limits.max_deviation_px + limits.max_deviation * radius + kNoiseDeviationPx * noise;
+    const double snr = 1.0 / noise;
+    blob.badness = blob.deviation / deviation_limit + blob.open / limits.max_open +
+                   kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) + std::max(0.0, kSureSnr - snr) / kSureSnr;
     blob.rejection = Rejection::kNone;
     if (blob.diameter_px < limits.min_diameter_px) {
         blob.rejection = Rejection::kSmall;
@@ -400,7 +411,7 @@ bool touches_border(const ImageView& image, const BlobWorkspace& w) {
 }
 
 // Outline -> background -> outline, twice unless the first outline was already right.
-Rejection outline_at_mid_contrast(const Component& component, const BlobLimits& limits, BlobWorkspace& w, PlaneFit& fit,
+Rejection outline_at_mid_contrast(Side side, const Component& component, const BlobLimits& limits, BlobWorkspace& w, PlaneFit& fit,
                                   Blob& blob) {
     int pixels = count_bits(w.blob, w.height);
     for (int round = 0; round < kRounds; ++round) {
@@ -411,8 +422,9 @@ Rejection outline_at_mid_contrast(const Component& component, const BlobLimits& 
         fit = refined_background(w, fit, core);
         blob.background = fit.plane.level;
         blob.contrast = fit.plane.level - core;
+        blob.depth = blob.contrast / std::max(1.0, side == Side::kBelow ? fit.plane.level : 255.0 - fit.plane.level);
         if (blob.contrast < limits.min_contrast) return Rejection::kFaint;
-        compute_cover(w, fit.plane, blob.contrast);
+        compute_cover(w, side, fit.plane, blob.contrast);
         Rejection reason = Rejection::kNone;
         if (!redraw_blob(w, kHalf, reason)) return reason;
         const int before = pixels;
@@ -450,7 +462,7 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
     }
     load_window(image, side, component, runs, w);
     PlaneFit fit;
-    blob.rejection = outline_at_mid_contrast(component, limits, w, fit, blob);
+    blob.rejection = outline_at_mid_contrast(side, component, limits, w, fit, blob);
     if (blob.rejection != Rejection::kNone) return blob;
     measure_outline(image, fit, kHalf, limits, w, blob);
     const bool shadowed = blob.rejection == Rejection::kOpen || blob.rejection == Rejection::kIrregular ||
@@ -458,7 +470,7 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
     Rejection reason = Rejection::kNone;
     if (shadowed && redraw_blob(w, kDeep, reason)) {
         measure_outline(image, fit, kDeep, limits, w, blob);
-        blob.score *= kDeepScore;
+        blob.badness += kDeepBadness;
     }
     return blob;
 }

@@ -30,7 +30,12 @@ bool PtyLink::open_pair() {
     const int master = master_.get();
     if (!os::system_call([&] { return grantpt(master); }).done()) return false;
     if (!os::system_call([&] { return unlockpt(master); }).done()) return false;
-    if (ptsname_r(master, slave_path_.data(), slave_path_.size()) != 0) return false;
+    const os::SystemResult named = os::system_call([&] {
+        errno = ptsname_r(master, slave_path_.data(),
+                          slave_path_.size());  // returns the error, unlike the others
+        return errno == 0 ? 0 : -1;
+    });
+    if (!named.done()) return false;
     if (!os::make_raw(master, os::kKeepRate)) return false;
     // A slave that was never opened accepts and keeps bytes as if somebody were there. Only after a first
     // close does the master see a hang-up, so the link makes that close itself.

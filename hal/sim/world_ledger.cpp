@@ -57,11 +57,12 @@ const char* WorldLedger::accept_time(std::int64_t time_us) {
 
 const char* WorldLedger::accept_frame_set(const WorldMessage& message) {
     if (message.slot >= hello_.slot_count) return "a frame in a slot that does not exist";
-    if (holders_[message.slot] != 0) return "a frame in a slot that is still in use";
+    if (ours_[message.slot]) return "a frame in a slot that is still in use";
     if ((message.camera_mask >> hello_.camera_count) != 0) return "a frame of a camera that does not exist";
     const bool lockstep = hello_.pace == WorldPace::kLockstep;
     if (lockstep && tick_outstanding_) return "a frame before the last tick was done";
     if (const char* fault = accept_time(message.time_us)) return fault;
+    ours_[message.slot] = true;
     tick_outstanding_ = lockstep;
     tick_sequence_ = message.sequence;
     const QueuedFrame frame{message.slot, message.sequence, message.time_us, message.published_us};
@@ -93,7 +94,7 @@ const char* WorldLedger::accept_edge(const WorldMessage& message) {
 
 void WorldLedger::drop_holder(std::size_t camera, std::uint32_t slot) {
     holders_[slot] = static_cast<std::uint8_t>(holders_[slot] & ~(1U << camera));
-    // A slot is freed once and cannot come again before its kSlotFree went out, so the list always has room.
+    // A slot is freed once and cannot come again before the list is taken, so the list always has room.
     if (holders_[slot] == 0) static_cast<void>(freed_.push_back(slot));
 }
 
@@ -117,6 +118,7 @@ bool WorldLedger::release(std::size_t camera, std::uint32_t slot) {
 }
 
 WorldLedger::SlotList WorldLedger::take_freed_slots() {
+    for (const std::uint32_t slot : freed_) ours_[slot] = false;
     return std::exchange(freed_, SlotList{});
 }
 

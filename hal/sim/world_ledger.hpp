@@ -77,6 +77,7 @@ class WorldLedger {
     std::array<bool, kMaxCameras> listening_{};
     std::array<Ring<QueuedFrame, kQueuedFrames>, kMaxCameras> queues_;
     std::array<std::uint8_t, kMaxWorldSlots> holders_{};  // bit c: camera c has the slot queued or borrowed
+    std::array<bool, kMaxWorldSlots> ours_{};  // from its frame set until its kSlotFree is taken out
     SlotList freed_;
     std::array<bool, kWorldLineCount> lines_{};
     std::array<Ring<EdgeEvent, kQueuedEdges>, kWorldLineCount> edges_;

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <map>
 #include <memory>
 #include <string>
 
@@ -18,16 +17,21 @@ struct ImportOptions {
     std::string neutral = "neutral.obj";
     std::string markers;
     std::string out;
-    double unit_mm = 1.0;
+    std::string unit = "mm";
     double scale = 1.0;
     bool force = false;
 };
+
+double unit_mm(const std::string& unit) {
+    if (unit == "m") return 1000.0;
+    return unit == "cm" ? 10.0 : 1.0;
+}
 
 int run_import(const ImportOptions& options) {
     const auto imported = import_obj_folder({.folder = options.obj_folder,
                                              .neutral = options.neutral,
                                              .markers = options.markers,
-                                             .mm_per_unit = options.unit_mm * options.scale});
+                                             .mm_per_unit = unit_mm(options.unit) * options.scale});
     if (!imported) {
         print_error(imported.error().message);
         return kExitInput;
@@ -67,10 +71,9 @@ void add_import_verb(CLI::App& app, int& exit_code) {
         ->required()
         ->type_name("LIST.csv");
     verb->add_option("--out", options->out, "Rig folder to write")->required()->type_name("DIR");
-    const std::map<std::string, double> units{{"mm", 1.0}, {"cm", 10.0}, {"m", 1000.0}};
-    verb->add_option("--unit", options->unit_mm, "Unit of the files: mm, cm or m (default mm)")
-        ->transform(CLI::Transformer(units, CLI::ignore_case).description(""))
-        ->check(CLI::IsMember({"1", "10", "1000"}).description(""))
+    verb->add_option("--unit", options->unit, "Unit of the files: mm, cm or m")
+        ->capture_default_str()
+        ->check(CLI::IsMember({"mm", "cm", "m"}).description(""))
         ->type_name("UNIT");
     verb->add_option("--scale", options->scale, "Further factor on all coordinates")
         ->capture_default_str()
