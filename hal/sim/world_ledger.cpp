@@ -38,6 +38,7 @@ const char* WorldLedger::accept(const WorldMessage& message) {
             return accept_edge(message);
         case WorldMessageKind::kAdvance:
             if (hello_.pace != WorldPace::kLockstep) return "an advance in real time";
+            if (message.time_us < time_us_) return "an advance to a time that has passed";
             return accept_time(message.time_us);
         case WorldMessageKind::kEnd:
             ended_ = true;
@@ -47,10 +48,8 @@ const char* WorldLedger::accept(const WorldMessage& message) {
     }
 }
 
-// Line edges and frames of one moment may come in either order in real time, so only lockstep is strict.
 const char* WorldLedger::accept_time(std::int64_t time_us) {
     if (time_us < 0 || time_us > kLatestTime_us) return "a time out of range";
-    if (hello_.pace == WorldPace::kLockstep && time_us < time_us_) return "a time before the last one";
     time_us_ = std::max(time_us_, time_us);
     return nullptr;
 }
@@ -61,7 +60,9 @@ const char* WorldLedger::accept_frame_set(const WorldMessage& message) {
     if ((message.camera_mask >> hello_.camera_count) != 0) return "a frame of a camera that does not exist";
     const bool lockstep = hello_.pace == WorldPace::kLockstep;
     if (lockstep && tick_outstanding_) return "a frame before the last tick was done";
+    if (message.time_us <= last_frame_us_) return "a frame that is not later than the last one";
     if (const char* fault = accept_time(message.time_us)) return fault;
+    last_frame_us_ = message.time_us;
     ours_[message.slot] = true;
     tick_outstanding_ = lockstep;
     tick_sequence_ = message.sequence;

@@ -69,7 +69,9 @@ class WorldLedger {
     void drop_holder(std::size_t camera, std::uint32_t slot);
 
     WorldHello hello_;
-    std::int64_t time_us_ = 0;
+    std::int64_t time_us_ =
+        0;  // the latest of all messages; edges may be told after the frame that they precede
+    std::int64_t last_frame_us_ = -1;
     bool ended_ = false;
     bool tick_outstanding_ = false;
     std::uint32_t tick_sequence_ = 0;

@@ -159,8 +159,10 @@ TEST_P(HostileWorld, BreakingTheProtocolIsGone) {
     const auto client = join(world);
     ASSERT_NE(client, nullptr);
     ASSERT_TRUE(client->camera(0).start());
-    world.send(plain(WorldMessageKind::kAdvance, 1'000'000));
+    world.send(frame_set(0, 0, 1'000'000, 2));
     world.send(GetParam().message);
+    ASSERT_EQ(client->camera(0).wait_frame(2'000'000).error(), FrameError::kTimeout);
+    client->tick_done();
     const auto frame = client->camera(0).wait_frame(2'000'000);
     ASSERT_FALSE(frame.has_value());
     EXPECT_EQ(frame.error(), FrameError::kGone);
@@ -179,7 +181,10 @@ INSTANTIATE_TEST_SUITE_P(Messages, HostileWorld,
                                          BadMessage{"SlotFarBeyond", frame_set(0xFFFF'FFFF, 1, 2'000'000)},
                                          BadMessage{"CameraBeyondTheCount", frame_set(0, 1, 2'000'000, 0x04)},
                                          BadMessage{"AllCamerasClaimed", frame_set(0, 1, 2'000'000, 0xFF)},
-                                         BadMessage{"TimeGoesBack", frame_set(0, 1, 999'999)},
+                                         BadMessage{"FrameGoesBack", frame_set(0, 1, 999'999)},
+                                         BadMessage{"FrameRepeats", frame_set(0, 1, 1'000'000)},
+                                         BadMessage{"AdvanceGoesBack",
+                                                    plain(WorldMessageKind::kAdvance, 999'999)},
                                          BadMessage{"NegativeTime", plain(WorldMessageKind::kAdvance, -1)},
                                          BadMessage{"HugeTime", plain(WorldMessageKind::kAdvance, INT64_MAX)},
                                          BadMessage{"LineBeyondTheCount", edge(6, 1, 2'000'000)},
