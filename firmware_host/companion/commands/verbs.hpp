@@ -17,7 +17,11 @@ inline constexpr int kExitInterrupted = 130;
 // Each add_<verb>_verb() adds its subcommand to `app` and stores its exit code in `exit_code` when it is run.
 // Declared one a line, in alphabetical order.
 void add_detect_verb(CLI::App& app, int& exit_code);
+void add_info_verb(CLI::App& app, int& exit_code);
+void add_monitor_verb(CLI::App& app, int& exit_code);
+void add_record_verb(CLI::App& app, int& exit_code);
 void add_solve_verb(CLI::App& app, int& exit_code);
+void add_status_verb(CLI::App& app, int& exit_code);
 
 void add_all_verbs(CLI::App& app, int& exit_code);
 
