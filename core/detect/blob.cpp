@@ -10,12 +10,22 @@ namespace {
 
 constexpr int kMargin = 8;         // px of surroundings on every side of the component
 constexpr int kFull = 256;         // cover of a pixel that is all blob
-constexpr int kHalf = kFull / 2;
-constexpr int kRampLow = 64;       // the soft threshold: weight 0 up to a quarter of the contrast,
-constexpr int kRampHigh = 192;     // 1 from three quarters on, linear between
+constexpr int kHalf = kFull / 2;   // where the outline is drawn,
+constexpr int kDeep = 176;         // or here where shadow touches the marker
+constexpr int kRamp = 64;          // soft threshold: weight 0 to 1 from outline - kRamp to outline + kRamp
+constexpr double kLeastShare = 0.4;     // of the light at the centre that a pixel's background may have,
+constexpr double kGreatestShare = 2.5;  // so that a bad plane cannot run away
+constexpr int kRedrawReach = 2;    // px that a redrawn outline may lie outside the old one
+constexpr int kMoatReach = 3;      // px
 constexpr int kOpenCover = 112;    // a moat pixel darker than this is no background
+constexpr int kCorePercent = 30;   // of the blob's pixels are darker than its core: clear of noise, glints and edge
+constexpr double kDeepBadness = 0.25;   // of a marker that only shows at the deep outline
+constexpr double kAspectBadness = 0.3;  // of the flattest disc
+constexpr double kNoiseDeviationPx = 1.0;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
+constexpr double kSureSnr = 6.0;        // contrast / spread of the surroundings: less costs
 constexpr int kMinRing = 12;       // pixels that can carry a plane
 constexpr int kRounds = 2;         // outline -> background -> outline
+constexpr int kFraction = 256;     // of a grey level: fixed point of the background plane
 
 // Grey level at column x, row y of the window: level + slope_x (x - centre_x) + slope_y (y - centre_y).
 struct Plane {
@@ -74,7 +84,7 @@ void load_window(const ImageView& image, Side side, const Component& component, 
     }
 }
 
-// Moat: the pixels from one to three steps outside the blob. Ring: from three to six steps.
+// Moat: the pixels from one to three steps outside the blob. Ring: from three to five.
 void draw_surroundings(BlobWorkspace& w) {
     const std::uint64_t mask = row_mask(w.width);
     BitRows& grown = w.scratch;
@@ -86,7 +96,6 @@ void draw_surroundings(BlobWorkspace& w) {
     const BitRows middle = grown;
     grow_cross(grown, w.height);
     grow_square(grown, w.height);
-    grow_cross(grown, w.height);
     for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) {
         w.moat[y] = middle[y] & ~inner[y] & mask;
         w.ring[y] = grown[y] & ~middle[y] & mask;
@@ -116,133 +125,209 @@ struct PlaneFit {
     bool ok = false;
 };
 
-// Least squares over the ring pixels within `reach` grey levels of `guess`. Sums are integers, so their order is free.
-PlaneFit fit_plane(const BlobWorkspace& w, const Plane& guess, double reach_below, double reach_above) {
-    std::int64_t n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0, sv = 0, sxv = 0, syv = 0, svv = 0;
-    for_each_bit(w.ring, w.height, [&](int px, int py) {
-        const int v = value_at(w, px, py);
-        const double rest = v - guess.at(px, py);
-        if (rest < -reach_below || rest > reach_above) return;
-        const std::int64_t x = px - guess.centre_x;
-        const std::int64_t y = py - guess.centre_y;
-        n += 1, sx += x, sy += y, sxx += x * x, sxy += x * y, syy += y * y;
-        sv += v, sxv += x * v, syv += y * v, svv += std::int64_t{v} * v;
-    });
-    PlaneFit fit;
-    if (n < kMinRing) return fit;
-    // All terms are below 2^47: exact in doubles. Centred normal equations, 2 x 2.
-    const auto count = static_cast<double>(n);
-    const auto cxx = static_cast<double>(n * sxx - sx * sx);
-    const auto cxy = static_cast<double>(n * sxy - sx * sy);
-    const auto cyy = static_cast<double>(n * syy - sy * sy);
-    const auto cxv = static_cast<double>(n * sxv - sx * sv);
-    const auto cyv = static_cast<double>(n * syv - sy * sv);
-    const auto cvv = static_cast<double>(n * svv - sv * sv);
-    const double determinant = cxx * cyy - cxy * cxy;
-    fit.plane = guess;
-    fit.plane.slope_x = 0.0;
-    fit.plane.slope_y = 0.0;
-    if (determinant > 0.0) {
-        fit.plane.slope_x = (cxv * cyy - cyv * cxy) / determinant;
-        fit.plane.slope_y = (cyv * cxx - cxv * cxy) / determinant;
+int fixed_point(double value) {
+    const double scaled = std::clamp(value, -1e6, 1e6) * kFraction;
+    return static_cast<int>(scaled < 0.0 ? scaled - 0.5 : scaled + 0.5);
+}
+
+struct PlaneSums {
+    std::int64_t n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, v = 0, xv = 0, yv = 0, vv = 0;
+};
+
+// Over the ring pixels whose grey level is within `below` under and `above` over the guess. Integers: order is free.
+PlaneSums sum_ring(const BlobWorkspace& w, const Plane& guess, double below, double above) {
+    const int slope_x = fixed_point(guess.slope_x);
+    const int slope_y = fixed_point(guess.slope_y);
+    const int lowest = fixed_point(guess.level - below);
+    const auto reach = static_cast<unsigned>(std::max(0, fixed_point(below + above)));
+    PlaneSums sums;
+    for (int py = 0; py < w.height; ++py) {
+        const int y = py - guess.centre_y;
+        const int row_lowest = lowest + slope_y * y - slope_x * guess.centre_x;
+        int n = 0, sx = 0, sxx = 0, sv = 0, sxv = 0, svv = 0;
+        for (std::uint64_t bits = w.ring[static_cast<std::size_t>(py)]; bits != 0; bits &= bits - 1) {
+            const int px = std::countr_zero(bits);
+            const int v = value_at(w, px, py);
+            const int x = px - guess.centre_x;
+            const int keep = static_cast<unsigned>(v * kFraction - row_lowest - slope_x * px) <= reach ? 1 : 0;
+            const int kept_v = keep * v;
+            n += keep, sx += keep * x, sxx += keep * x * x, sv += kept_v, sxv += kept_v * x, svv += kept_v * v;
+        }
+        sums.n += n, sums.x += sx, sums.xx += sxx, sums.v += sv, sums.xv += sxv, sums.vv += svv;
+        sums.y += std::int64_t{n} * y, sums.xy += std::int64_t{sx} * y, sums.yy += std::int64_t{n} * y * y;
+        sums.yv += std::int64_t{sv} * y;
     }
-    fit.plane.level = (static_cast<double>(sv) - fit.plane.slope_x * static_cast<double>(sx) -
-                       fit.plane.slope_y * static_cast<double>(sy)) / count;
+    return sums;
+}
+
+PlaneFit fit_plane(const BlobWorkspace& w, const Plane& guess, double below, double above) {
+    const PlaneSums s = sum_ring(w, guess, below, above);
+    PlaneFit fit;
+    if (s.n < kMinRing) return fit;
+    // Centred normal equations, 2 x 2; every term is below 2^47, exact in doubles.
+    const auto count = static_cast<double>(s.n);
+    const auto cxx = static_cast<double>(s.n * s.xx - s.x * s.x);
+    const auto cxy = static_cast<double>(s.n * s.xy - s.x * s.y);
+    const auto cyy = static_cast<double>(s.n * s.yy - s.y * s.y);
+    const auto cxv = static_cast<double>(s.n * s.xv - s.x * s.v);
+    const auto cyv = static_cast<double>(s.n * s.yv - s.y * s.v);
+    const auto cvv = static_cast<double>(s.n * s.vv - s.v * s.v);
+    const double determinant = cxx * cyy - cxy * cxy;
+    fit.plane.centre_x = guess.centre_x;
+    fit.plane.centre_y = guess.centre_y;
+    if (determinant > 0.0) {
+        fit.plane.slope_x = std::clamp((cxv * cyy - cyv * cxy) / determinant, -255.0, 255.0);
+        fit.plane.slope_y = std::clamp((cyv * cxx - cxv * cxy) / determinant, -255.0, 255.0);
+    }
+    fit.plane.level = (static_cast<double>(s.v) - fit.plane.slope_x * static_cast<double>(s.x) -
+                       fit.plane.slope_y * static_cast<double>(s.y)) / count;
     const double rest = cvv - fit.plane.slope_x * cxv - fit.plane.slope_y * cyv;
     fit.rms = rest > 0.0 ? sqrt(rest) / count : 0.0;
     fit.ok = true;
     return fit;
 }
 
-// The skin around the blob as a plane: pixels that are clearly part of something else are left out by two refits.
-PlaneFit fit_background(BlobWorkspace& w, const Component& component, int core) {
+// The skin around the blob as a plane. The first fit takes what is on the skin's side of mid contrast; refits leave
+// out what is clearly part of something else: other markers, shadows, the dark behind the face.
+PlaneFit first_background(BlobWorkspace& w, const Component& component, int core) {
     Plane guess;
     guess.centre_x = (component.left + component.right) / 2 - w.left;
     guess.centre_y = (component.top + component.bottom) / 2 - w.top;
     guess.level = percentile(w.ring, 50, w);
     const double depth = std::max(4.0, guess.level - core);
-    PlaneFit fit = fit_plane(w, guess, 0.5 * depth, depth);
-    if (!fit.ok) return fit;
-    for (int round = 0; round < 2; ++round) {
-        const double reach = std::max(6.0, 2.5 * fit.rms);
-        const PlaneFit again = fit_plane(w, fit.plane, std::min(reach, 0.4 * depth + 4.0), reach);
-        if (!again.ok) break;
-        fit = again;
-    }
-    return fit;
+    return fit_plane(w, guess, 0.5 * depth, depth);
 }
 
-// Cover of every pixel of the window, clamped to -1..2 blobs so that 16 bits hold it.
-void compute_cover(BlobWorkspace& w, const Plane& plane, double depth) {
-    const double scale = kFull / depth;
+PlaneFit refined_background(const BlobWorkspace& w, const PlaneFit& fit, int core) {
+    const double reach = std::max(6.0, 2.5 * fit.rms);
+    const double depth = std::max(4.0, fit.plane.level - core);
+    const PlaneFit again = fit_plane(w, fit.plane, std::min(reach, 0.4 * depth + 4.0), reach);
+    return again.ok ? again : fit;
+}
+
+struct Box {
+    int left = 0;
+    int top = 0;
+    int right = 0;   // exclusive
+    int bottom = 0;  // exclusive
+};
+
+// Of a blob that is not empty, widened by `by` and cut at the window.
+Box box_around(const BlobWorkspace& w, int by) {
+    Box box{0, -1, 0, 0};
+    std::uint64_t columns = 0;
     for (int y = 0; y < w.height; ++y) {
+        const std::uint64_t row = w.blob[static_cast<std::size_t>(y)];
+        if (row == 0) continue;
+        if (box.top < 0) box.top = y;
+        box.bottom = y + 1;
+        columns |= row;
+    }
+    box.left = std::max(0, std::countr_zero(columns) - by);
+    box.right = std::min(w.width, 64 - std::countl_zero(columns) + by);
+    box.top = std::max(0, box.top - by);
+    box.bottom = std::min(w.height, box.bottom + by);
+    return box;
+}
+
+// Cover of every pixel that redrawing and judging can look at, clamped to -1..2 blobs so that 16 bits hold it. Paint
+// scales the light that falls on the skin, so the depth of a whole pixel of blob follows the background's gradient;
+// taking it as constant pulls centres towards the bright side (0.15 px on a shaded forehead).
+void compute_cover(BlobWorkspace& w, Side side, const Plane& plane, double depth) {
+    const double black = side == Side::kBelow ? 0.0 : 255.0;
+    const double light = side == Side::kBelow ? 1.0 : -1.0;
+    const double centre_light = std::max(1.0, light * (plane.level - black));
+    const double to_share = light / centre_light;
+    const double scale = kFull / depth;
+    const Box box = box_around(w, kRedrawReach + kMoatReach);
+    for (int y = box.top; y < box.bottom; ++y) {
         const auto& values = w.values[static_cast<std::size_t>(y)];
         auto& cover = w.cover[static_cast<std::size_t>(y)];
         const double row_level = plane.level + plane.slope_y * (y - plane.centre_y) - plane.slope_x * plane.centre_x;
-        for (int x = 0; x < w.width; ++x) {
+        for (int x = box.left; x < box.right; ++x) {
             const double level = row_level + plane.slope_x * x;
-            const double c = (level - values[static_cast<std::size_t>(x)]) * scale;
+            const double share = std::clamp((level - black) * to_share, kLeastShare, kGreatestShare);
+            const double c = (level - values[static_cast<std::size_t>(x)]) * scale / share;
             cover[static_cast<std::size_t>(x)] = static_cast<std::int16_t>(std::clamp(c, -256.0, 512.0));
         }
     }
 }
 
-// The outline at mid contrast: the piece that holds most of the old blob, holes filled. False if nothing is left;
-// `pieces` is the part of the old blob's mid-contrast pixels that lies in other pieces.
-bool redraw_blob(BlobWorkspace& w, double& pieces) {
-    BitRows allowed = w.blob;
-    grow_square(allowed, w.height);
-    grow_cross(allowed, w.height);
-    for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) {
+// Pixels near the old blob whose cover reaches `outline`.
+void mark_covered(const BlobWorkspace& w, int outline, BitRows& covered) {
+    const Box box = box_around(w, kRedrawReach);
+    covered = w.blob;
+    grow_square(covered, w.height);
+    grow_cross(covered, w.height);
+    for (int y = box.top; y < box.bottom; ++y) {
+        const auto row = static_cast<std::size_t>(y);
         std::uint64_t bits = 0;
-        for (std::size_t x = 0; x < static_cast<std::size_t>(w.width); ++x) {
-            bits |= std::uint64_t{w.cover[y][x] >= kHalf} << x;
+        for (int x = box.left; x < box.right; ++x) {
+            bits |= std::uint64_t{w.cover[row][static_cast<std::size_t>(x)] >= outline} << x;
         }
-        allowed[y] &= bits;
+        covered[row] &= bits;
     }
-    const int total = count_bits(allowed, w.height);
-    BitRows best{};
+}
+
+// The largest connected piece of `rest`, which loses all its pieces.
+int largest_piece(BitRows& rest, int height, BitRows& best) {
     int best_count = 0;
-    BitRows rest = allowed;
     for (int piece = 0; piece < 8; ++piece) {  // more pieces than that are noise
         std::size_t y = 0;
-        while (y < static_cast<std::size_t>(w.height) && rest[y] == 0) ++y;
-        if (y == static_cast<std::size_t>(w.height)) break;
+        while (y < static_cast<std::size_t>(height) && rest[y] == 0) ++y;
+        if (y == static_cast<std::size_t>(height)) break;
         BitRows seed{};
         seed[y] = rest[y] & (~rest[y] + 1);
-        flood(seed, rest, w.height);
-        const int count = count_bits(seed, w.height);
-        for (std::size_t k = 0; k < static_cast<std::size_t>(w.height); ++k) rest[k] &= ~seed[k];
+        flood(seed, rest, height);
+        const int count = count_bits(seed, height);
+        for (std::size_t k = 0; k < static_cast<std::size_t>(height); ++k) rest[k] &= ~seed[k];
         if (count > best_count) {
             best = seed;
             best_count = count;
         }
     }
-    if (best_count == 0) return false;
-    pieces = static_cast<double>(total - best_count) / total;
+    return best_count;
+}
+
+// The blob becomes its own outline at `outline` of the contrast: the largest piece, holes filled (glints). False if
+// nothing or less than four fifths of the pixels are in one piece.
+bool redraw_blob(BlobWorkspace& w, int outline, Rejection& reason) {
+    BitRows& covered = w.scratch;
+    mark_covered(w, outline, covered);
+    const int total = count_bits(covered, w.height);
+    BitRows best{};
+    const int count = largest_piece(covered, w.height, best);
+    reason = count == 0 ? Rejection::kSmall : Rejection::kSeveral;
+    if (count == 0 || (total - count) * 5 > total) return false;
     w.blob = best;
     fill_holes(w.blob, w.width, w.height);
     return true;
 }
 
-// Weights of the soft threshold over the blob and two steps around it; filled holes count as blob.
-Moments soft_moments(BlobWorkspace& w) {
+// Weights of the soft threshold over the blob and one step around it; filled holes count as blob.
+Moments soft_moments(BlobWorkspace& w, int outline) {
     BitRows& region = w.scratch;
     region = w.blob;
     grow_square(region, w.height);
-    const BitRows& inside = w.blob;
+    const int low = outline - kRamp;
+    const int high = outline + kRamp;
     std::int64_t n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
-    for_each_bit(region, w.height, [&](int x, int y) {
-        int cover = cover_at(w, x, y);
-        if ((inside[static_cast<std::size_t>(y)] >> x & 1U) != 0) cover = std::max(cover, kHalf);
-        const std::int64_t weight = std::clamp(cover, kRampLow, kRampHigh) - kRampLow;
-        n += weight, sx += weight * x, sy += weight * y;
-        sxx += weight * x * x, sxy += weight * x * y, syy += weight * y * y;
-    });
+    for (int y = 0; y < w.height; ++y) {
+        const std::uint64_t inside = w.blob[static_cast<std::size_t>(y)];
+        int rn = 0, rx = 0, rxx = 0;
+        for (std::uint64_t bits = region[static_cast<std::size_t>(y)]; bits != 0; bits &= bits - 1) {
+            const int x = std::countr_zero(bits);
+            const int least = (inside >> x & 1U) != 0 ? outline : low;
+            const int weight = std::clamp(cover_at(w, x, y), least, high) - low;
+            rn += weight, rx += weight * x, rxx += weight * x * x;
+        }
+        n += rn, sx += rx, sxx += rxx, sy += std::int64_t{rn} * y;
+        sxy += std::int64_t{rx} * y, syy += std::int64_t{rn} * y * y;
+    }
     Moments m;
     if (n == 0) return m;
     const auto count = static_cast<double>(n);
-    m.weight = count / (kRampHigh - kRampLow);
+    m.weight = count / (2 * kRamp);
     m.x = static_cast<double>(sx) / count;
     m.y = static_cast<double>(sy) / count;
     m.xx = static_cast<double>(n * sxx - sx * sx) / (count * count);
@@ -255,15 +340,19 @@ Moments soft_moments(BlobWorkspace& w) {
 double outline_deviation_px(const BlobWorkspace& w, const Moments& m, double mean_radius_px) {
     const double determinant = m.xx * m.yy - m.xy * m.xy;
     if (determinant <= 0.0) return kBlobWindowPx;
+    const Box box = box_around(w, 2);
+    const double a = m.yy / determinant;
+    const double b = -2.0 * m.xy / determinant;
+    const double c = m.xx / determinant;
     int wrong = 0;
-    for (int y = 0; y < w.height; ++y) {
+    for (int y = box.top; y < box.bottom; ++y) {
         const double dy = y - m.y;
-        const std::uint64_t row = w.blob[static_cast<std::size_t>(y)];
-        for (int x = 0; x < w.width; ++x) {
+        std::uint64_t ellipse = 0;
+        for (int x = box.left; x < box.right; ++x) {
             const double dx = x - m.x;
-            const double form = (m.yy * dx * dx - 2.0 * m.xy * dx * dy + m.xx * dy * dy) / determinant;
-            wrong += static_cast<int>((form <= 4.0) != ((row >> x & 1U) != 0));
+            ellipse |= std::uint64_t{(a * dx + b * dy) * dx + c * dy * dy <= 4.0} << x;
         }
+        wrong += std::popcount(ellipse ^ w.blob[static_cast<std::size_t>(y)]);
     }
     return wrong / (6.283185307179586 * mean_radius_px);
 }
@@ -291,12 +380,11 @@ void judge(const BlobWorkspace& w, const Moments& m, const PlaneFit& fit, const 
     blob.deviation = outline_deviation_px(w, m, radius);
     blob.open = open_part(w);
     const double aspect = blob.long_axis_px / blob.short_axis_px;
-    const double deviation_limit = 0.12 + 0.05 * radius;
-    const double snr = blob.contrast / std::max(1.0, fit.rms);
-    blob.score = std::clamp(1.0 - 0.5 * blob.deviation / deviation_limit, 0.0, 1.0) *
-                 std::clamp(1.0 - 0.5 * blob.open / limits.max_open, 0.0, 1.0) * std::clamp(snr / 8.0, 0.25, 1.0) *
-                 std::clamp(1.5 - 0.5 * aspect / limits.max_aspect, 0.0, 1.0);
-    blob.score = std::min(blob.score, 1.0);
+    const double noise = std::max(1.0, fit.rms) / blob.contrast;
+    const double deviation_limit = limits.max_deviation_px + limits.max_deviation * radius + kNoiseDeviationPx * noise;
+    const double snr = 1.0 / noise;
+    blob.badness = blob.deviation / deviation_limit + blob.open / limits.max_open +
+                   kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) + std::max(0.0, kSureSnr - snr) / kSureSnr;
     blob.rejection = Rejection::kNone;
     if (blob.diameter_px < limits.min_diameter_px) {
         blob.rejection = Rejection::kSmall;
@@ -322,6 +410,45 @@ bool touches_border(const ImageView& image, const BlobWorkspace& w) {
            (w.top + w.height == image.height_px && w.blob[last] != 0);
 }
 
+// Outline -> background -> outline, twice unless the first outline was already right.
+Rejection outline_at_mid_contrast(Side side, const Component& component, const BlobLimits& limits, BlobWorkspace& w, PlaneFit& fit,
+                                  Blob& blob) {
+    int pixels = count_bits(w.blob, w.height);
+    for (int round = 0; round < kRounds; ++round) {
+        draw_surroundings(w);
+        const int core = percentile(w.blob, kCorePercent, w);
+        if (round == 0) fit = first_background(w, component, core);
+        if (!fit.ok) return Rejection::kOpen;
+        fit = refined_background(w, fit, core);
+        blob.background = fit.plane.level;
+        blob.contrast = fit.plane.level - core;
+        blob.depth = blob.contrast / std::max(1.0, side == Side::kBelow ? fit.plane.level : 255.0 - fit.plane.level);
+        if (blob.contrast < limits.min_contrast) return Rejection::kFaint;
+        compute_cover(w, side, fit.plane, blob.contrast);
+        Rejection reason = Rejection::kNone;
+        if (!redraw_blob(w, kHalf, reason)) return reason;
+        const int before = pixels;
+        pixels = count_bits(w.blob, w.height);
+        if (std::abs(pixels - before) * 4 <= before) break;
+    }
+    return Rejection::kNone;
+}
+
+void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, const BlobLimits& limits,
+                     BlobWorkspace& w, Blob& blob) {
+    if (touches_border(image, w)) {
+        blob.rejection = Rejection::kEdge;
+        return;
+    }
+    draw_surroundings(w);
+    const Moments moments = soft_moments(w, outline);
+    if (moments.weight <= 0.0) {
+        blob.rejection = Rejection::kSmall;
+        return;
+    }
+    judge(w, moments, fit, limits, blob);
+}
+
 }  // namespace
 
 Blob measure_blob(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,
@@ -335,38 +462,16 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
     }
     load_window(image, side, component, runs, w);
     PlaneFit fit;
-    double pieces = 0.0;
-    for (int round = 0; round < kRounds; ++round) {
-        draw_surroundings(w);
-        const int core = percentile(w.blob, 30, w);
-        fit = fit_background(w, component, core);
-        if (!fit.ok) {
-            blob.rejection = Rejection::kOpen;
-            return blob;
-        }
-        const Moments rough = Moments{};
-        (void)rough;
-        blob.background = fit.plane.level;
-        blob.contrast = fit.plane.level - core;
-        if (blob.contrast < limits.min_contrast) {
-            blob.rejection = Rejection::kFaint;
-            return blob;
-        }
-        compute_cover(w, fit.plane, blob.contrast);
-        if (!redraw_blob(w, pieces)) return blob;
-        if (pieces > 0.2) {
-            blob.rejection = Rejection::kSeveral;
-            return blob;
-        }
+    blob.rejection = outline_at_mid_contrast(side, component, limits, w, fit, blob);
+    if (blob.rejection != Rejection::kNone) return blob;
+    measure_outline(image, fit, kHalf, limits, w, blob);
+    const bool shadowed = blob.rejection == Rejection::kOpen || blob.rejection == Rejection::kIrregular ||
+                          blob.rejection == Rejection::kElongated;
+    Rejection reason = Rejection::kNone;
+    if (shadowed && redraw_blob(w, kDeep, reason)) {
+        measure_outline(image, fit, kDeep, limits, w, blob);
+        blob.badness += kDeepBadness;
     }
-    if (touches_border(image, w)) {
-        blob.rejection = Rejection::kEdge;
-        return blob;
-    }
-    draw_surroundings(w);
-    const Moments moments = soft_moments(w);
-    if (moments.weight <= 0.0) return blob;
-    judge(w, moments, fit, limits, blob);
     return blob;
 }
 

@@ -34,7 +34,8 @@ struct BlobLimits {
     double max_diameter_px = 28.0;    // long axis
     double min_contrast = 10.0;       // grey levels
     double max_aspect = 4.5;          // long axis / short axis
-    double max_deviation = 0.16;      // outline's distance from the ellipse of equal moments / mean radius
+    double max_deviation_px = 0.12;   // mean distance of the outline from the ellipse of equal moments, plus
+    double max_deviation = 0.03;      // this part of the mean radius
     double max_open = 0.22;           // part of the moat that is not background
 };
 
@@ -48,8 +49,9 @@ struct Blob {
     double background = 0.0;    // grey level at the centre
     double deviation = 0.0;
     double open = 0.0;
-    double blur = 0.0;          // px: width of the edge between one and three quarters of the contrast
-    double score = 0.0;         // 0..1
+    double depth = 0.0;         // contrast / light: the part of the skin's light that the ink takes, or the paint adds
+    double badness = 0.0;       // 0 = a perfect disc; 1 = as far off as any one limit allows
+    double score = 0.0;         // 0..1, from badness and the other blobs of the image
     Rejection rejection = Rejection::kSmall;
 };
 

@@ -204,14 +204,14 @@ Result<WeightsPart, WireError> decode_weights(ByteSpan payload) {
 namespace {
 
 constexpr std::uint8_t kSeenBit = 1U << 7;
-constexpr double kMaxMarkerUnits = 32767.0;
+constexpr double kMarkerUnitsBound = 32767.5;  // what rounds to 32767 is still sent
 
 // All axes within the wire's range.
 bool fits(const std::array<float, 3>& position_mm) {
     bool good = true;
     for (const float value : position_mm) {
         const double units = static_cast<double>(value) * kUnitsPerMm;
-        good = good && units >= -kMaxMarkerUnits && units <= kMaxMarkerUnits;  // false for NaN
+        good = good && units > -kMarkerUnitsBound && units < kMarkerUnitsBound;  // false for NaN
     }
     return good;
 }
