@@ -15,6 +15,7 @@ constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5, 0.75};  // 
 constexpr double kFringe = 4.0;            // px by which blur and noise lengthen a component
 constexpr double kSizeMargin = 1.6;        // largest marker of an image / usual marker
 constexpr double kSureBadness = 0.7;       // below: good enough to say what the markers of this image are like
+constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
 constexpr double kHopelessBadness = 1.5;   // score 0
 
 // The least pixels a disc of the least diameter shows above mid contrast, with a margin for blur.
@@ -337,6 +338,25 @@ void Detector::hand_on(const SideResult& result, Observations& observations, Det
     }
 }
 
+// Which side the markers are on. Both are tried until the decision has settled, and again when that side fails.
+std::size_t Detector::look(const ImageView& image, const BlockGrid& means, DetectorReport& report) {
+    Workspace& w = workspace_;
+    const auto try_side = [&](std::size_t index) {
+        detect_side(image, means, index == 0 ? Side::kBelow : Side::kAbove, w.sides[index]);
+        add_reports(report, w.sides[index].report);
+    };
+    const bool automatic = config_.polarity == MarkerPolarity::kAuto;
+    const MarkerPolarity likely = automatic ? state_.polarity : config_.polarity;
+    const std::size_t first = likely == MarkerPolarity::kBright ? 1 : 0;
+    try_side(first);
+    if (!automatic) return first;
+    if (state_.agreed >= config_.polarity_frames && w.sides[first].quality >= kSettledQuality) return first;
+    try_side(1 - first);
+    const std::size_t chosen = w.sides[1].quality > w.sides[0].quality ? 1 : 0;
+    decide(chosen);
+    return chosen;
+}
+
 void Detector::detect(const ImageView& image, Observations& observations, DetectorReport& report) {
     observations.clear();
     report = DetectorReport{};
@@ -347,21 +367,7 @@ void Detector::detect(const ImageView& image, Observations& observations, Detect
     measure_exposure(image, report);
     Workspace& w = workspace_;
     const BlockGrid means = block_means(image, w.means);
-    MarkerPolarity polarity = config_.polarity;
-    if (polarity == MarkerPolarity::kAuto && state_.agreed >= config_.polarity_frames) polarity = state_.polarity;
-    std::size_t chosen = polarity == MarkerPolarity::kBright ? 1 : 0;
-    if (polarity == MarkerPolarity::kAuto) {
-        detect_side(image, means, Side::kBelow, w.sides[0]);
-        detect_side(image, means, Side::kAbove, w.sides[1]);
-        chosen = w.sides[1].quality > w.sides[0].quality ? 1 : 0;
-        add_reports(report, w.sides[0].report);
-        add_reports(report, w.sides[1].report);
-        decide(chosen);
-    } else {
-        const Side side = chosen == 0 ? Side::kBelow : Side::kAbove;
-        detect_side(image, means, side, w.sides[chosen]);
-        add_reports(report, w.sides[chosen].report);
-    }
+    const std::size_t chosen = look(image, means, report);
     report.polarity = chosen == 0 ? MarkerPolarity::kDark : MarkerPolarity::kBright;
     hand_on(w.sides[chosen], observations, report);
     if (report.runs_full || report.blobs_full || report.observations_full) {

@@ -124,6 +124,7 @@ class Detector {
     [[nodiscard]] double usual_size(const Blobs& blobs) const;
     [[nodiscard]] double usual_depth(const Blobs& blobs) const;
     void apply_population(Side side, SideResult& result) const;
+    [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);
     void decide(std::size_t dark_or_bright);
     void hand_on(const SideResult& result, Observations& observations, DetectorReport& report) const;
 

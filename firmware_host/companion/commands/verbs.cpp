@@ -4,7 +4,8 @@ namespace rig::host {
 
 void add_all_verbs(CLI::App& app, int& exit_code) {
     // in the order in which a newcomer meets them
-    add_demo_verb(app, exit_code);
+    add_sample_verb(app, exit_code);
+    add_import_verb(app, exit_code);
     add_world_verb(app, exit_code);
     add_train_verb(app, exit_code);
     add_pack_verb(app, exit_code);
