@@ -74,7 +74,7 @@ class App {
     [[nodiscard]] AppEnd run_threads(const std::atomic<bool>& stop, Hook on_ready, Hook on_leave);
 
     [[nodiscard]] const StreamDigest& digest() const { return solver_.digest(); }
-    [[nodiscard]] Health health() const { return port_.health(); }
+    [[nodiscard]] Health health() const { return port_.health(solver_.health()); }
 
   private:
     friend class ThreadsExecutor;

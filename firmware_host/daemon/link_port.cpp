@@ -168,7 +168,7 @@ bool LinkPort::load_stream_frame() {
             break;
         case Stage::kStatus:
             type = MessageType::kStatus;
-            length = encode(health(), payload);
+            length = encode(health(sending_.health), payload);
             status_wanted_ = false;
             stage_ = Stage::kNothing;
             break;
@@ -231,8 +231,8 @@ void LinkPort::tell_faults() {
     }
 }
 
-Health LinkPort::health() const {
-    Health health = sending_.health;
+Health LinkPort::health(const Health& of_solver) const {
+    Health health = of_solver;
     health.now_us = clock_.now_us();
     health.frames_sent = states_sent_;
     health.frames_dropped = replaced_.load(std::memory_order_relaxed);

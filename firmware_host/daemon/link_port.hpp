@@ -64,7 +64,8 @@ class LinkPort {
     // Faults of the way to the host, and those that control found in what it says.
     void raise(Fault fault) { raised_ |= fault_bit(fault); }
     void note_received(const FrameCounters& received) { received_ = received; }
-    [[nodiscard]] Health health() const;
+    // The solver's part with the link's added.
+    [[nodiscard]] Health health(const Health& of_solver) const;
 
   private:
     enum class Stage : std::uint8_t { kWeights, kMarkers, kStatus, kNothing };

@@ -49,6 +49,7 @@ AppEnd ThreadsExecutor::run(App::Hook on_ready, App::Hook on_leave) {
     on_leave();
     app_.parts_.watchdog.disarm();
     leaving_ = true;
+    leaving_.notify_all();
     output_ready_.raise();
     for (std::thread& thread : threads_) thread.join();
     app_.say_goodbye();
@@ -98,6 +99,7 @@ void ThreadsExecutor::capture(std::size_t camera) {
         pictures_.raise();
     }
     pictures_.raise();
+    leaving_.wait(false);  // the end of a thread gives memory back: not before the heap is unsealed
 }
 
 void ThreadsExecutor::serve_link() {
