@@ -1,11 +1,13 @@
 #include "core/infer/inference.hpp"
 
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <memory>
 #include <vector>
 
+#include "core/stabilise/stabiliser.hpp"
 #include "tests/support/synthetic_face.hpp"
 
 namespace rig {
