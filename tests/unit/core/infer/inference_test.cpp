@@ -1,6 +1,5 @@
 #include "core/infer/inference.hpp"
 
-
 #include <gtest/gtest.h>
 
 #include <cmath>
