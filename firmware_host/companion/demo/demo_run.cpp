@@ -19,6 +19,8 @@
 #include "firmware_host/companion/links/link_spec.hpp"
 #include "firmware_host/companion/train/camera_file.hpp"
 #include "firmware_host/companion/train/pack_writer.hpp"
+#include "firmware_host/companion/replay/replay_log.hpp"
+#include "firmware_host/daemon/stream_digest.hpp"
 #include "firmware_host/pack_file/opened_pack.hpp"
 
 namespace rig::host {
@@ -153,6 +155,13 @@ class Reception {
     [[nodiscard]] std::int64_t last_received_us() const { return last_received_us_; }
     [[nodiscard]] const std::vector<FaceState>& states() const { return states_; }
     [[nodiscard]] bool has(std::size_t frame) const { return have_[frame]; }
+    [[nodiscard]] std::uint64_t digest() const {
+        StreamDigest digest;
+        for (std::size_t f = 0; f < states_.size(); ++f) {
+            if (have_[f]) digest.add(states_[f]);
+        }
+        return digest.value();
+    }
     [[nodiscard]] LatencyFigures latency() {
         LatencyFigures figures;
         if (latencies_ms_.empty()) return figures;
@@ -200,6 +209,8 @@ Result<ChildProcess, FileError> start_daemon(const DemoOptions& options, const s
                                              "--pack", (options.out_folder / "face.pack").string(),
                                              "--link", "pty:" + line.string(),
                                              "--stream", "weights,markers,status",
+                                             "--log-observations", (options.out_folder / "take.rgo").string(),
+                                             "--digest",
                                              "--executor", options.real_time ? "threads" : "lockstep"};
     return ChildProcess::start(arguments, options.out_folder / "headrigd.log");
 }
@@ -368,6 +379,7 @@ std::vector<std::string> broken_bounds(const DemoFigures& figures, const DemoBou
           fmt::format("{} of {} received frames have a solve behind them", a.frames_judged, figures.received));
     if (real_time) return broken;
     check(figures.lost == 0, fmt::format("{} frames lost", figures.lost));
+    check(figures.digest == figures.replayed_digest, "the observation log solves to other weights than were received");
     check(figures.bad_wire == 0, fmt::format("{} wire frames refused", figures.bad_wire));
     return broken;
 }
@@ -426,6 +438,12 @@ Result<DemoFigures, FileError> run_demo(const DemoOptions& options, const DemoEv
         return failure(daemon_fault(options, end ? fmt::format("ended with code {}", end->exit_code) : "does not end"));
     }
     if (served != ServerEnd::kCompleted) return failure(daemon_fault(options, "left the world before its end"));
+    events.step("solving the recorded observations again");
+    const auto replayed = replay_log({options.out_folder / "take.rgo", (options.out_folder / "face.pack").string(), false},
+                                     *pack, [](const FaceState&, double) { return true; });
+    if (!replayed) return failure(replayed.error());
+    figures.digest = reception.digest();
+    figures.replayed_digest = replayed->digest;
     events.step("drawing the pictures");
     if (const auto written = write_outputs(options, *stage, pack->pack(), reception, figures); !written) {
         return failure(written.error());
