@@ -189,6 +189,7 @@ void PaintedFace::place_dots(const MarkerLayout& layout) {
     for (const auto& list : lists) {
         dot_list_.insert(dot_list_.end(), list.begin(), list.end());
         dot_offsets_.push_back(static_cast<std::uint32_t>(dot_list_.size()));
+        painted_.push_back(list.empty() ? 0 : 1);
     }
 }
 

@@ -58,6 +58,7 @@ class PaintedFace {
         return {dot_list_.data() + dot_offsets_[triangle],
                 dot_offsets_[triangle + 1] - dot_offsets_[triangle]};
     }
+    [[nodiscard]] bool may_be_painted(std::size_t triangle) const { return painted_[triangle] != 0; }
     // Diffuse reflectance with hollows darkened, 0..1, and gloss, 0..1, per vertex.
     [[nodiscard]] const std::vector<float>& albedo() const { return albedo_; }
     [[nodiscard]] const std::vector<float>& openness() const { return openness_; }
@@ -76,6 +77,7 @@ class PaintedFace {
     std::vector<Dot> dots_;
     std::vector<std::uint32_t> dot_offsets_;
     std::vector<std::uint16_t> dot_list_;
+    std::vector<std::uint8_t> painted_;  // 1 where dots_of() is not empty
     std::vector<std::uint32_t> shape_offsets_;
     std::vector<std::int32_t> shape_vertices_;
     std::vector<float> shape_deltas_;  // 4 per entry: x, y, z, 0

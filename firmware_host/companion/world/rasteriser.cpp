@@ -100,6 +100,16 @@ RIG_INLINE void draw(const TrianglePlane& plane, std::uint32_t index, const Boun
     }
 }
 
+RIG_INLINE LightPlane light_plane(const TrianglePlane& plane, const SeenVertices& seen,
+                                  const std::array<std::size_t, 3>& v, std::uint32_t triangle) {
+    const float light = seen.light[v[0]];
+    const float towards_b = seen.light[v[1]] - light;
+    const float towards_c = seen.light[v[2]] - light;
+    const float per_x = towards_b * plane.bx + towards_c * plane.cx;
+    const float per_y = towards_b * plane.by + towards_c * plane.cy;
+    return {light - per_x * plane.ax - per_y * plane.ay, per_x, per_y, triangle};
+}
+
 constexpr int kTile_px = 8;
 static_assert(kTile_px % kWide == 0);
 
@@ -165,9 +175,12 @@ PixelGrid::PixelGrid(const HelmetCamera& camera)
 }
 
 void PixelGrid::clear() {
-    for (int y = first_row_; y < end_row_; ++y) {
+    const int first = first_column_ / kWide;
+    const int end = (end_column_ + kWide - 1) / kWide;
+    const int end_row = end_row_;
+    for (int y = first_row_; y < end_row; ++y) {
         PixelGroup* groups = row(y);
-        for (int g = first_column_ / kWide; g < (end_column_ + kWide - 1) / kWide; ++g) {
+        for (int g = first; g < end; ++g) {
             groups[g].inverse_depth.fill(0.0F);
             groups[g].plane.fill(kNothing);
         }
@@ -230,7 +243,7 @@ RIG_WIDE_LOOPS void rasterise(std::span<const Int3> triangles, std::size_t front
                               const SeenVertices& seen, PixelGrid& grid, SeenSurface& surface) {
     grid.clear();
     surface.planes.clear();
-    surface.triangle.clear();
+    surface.lights.clear();
     surface.first_column = grid.width_px();
     surface.first_row = grid.height_px();
     surface.end_column = 0;
@@ -253,22 +266,11 @@ RIG_WIDE_LOOPS void rasterise(std::span<const Int3> triangles, std::size_t front
         if (box.first_column >= box.end_column || box.first_row >= box.end_row) continue;
         if (t >= front_count && is_covered(box, most(ia, ib, ic), across, surface.cover)) continue;
         const float scale = 1.0F / area;
-        const float light = seen.light[v[0]];
-        const TrianglePlane plane{seen.x[v[0]],
-                                  seen.y[v[0]],
-                                  wy * scale,
-                                  -wx * scale,
-                                  -uy * scale,
-                                  ux * scale,
-                                  ia,
-                                  ib - ia,
-                                  ic - ia,
-                                  light,
-                                  seen.light[v[1]] - light,
-                                  seen.light[v[2]] - light};
+        const TrianglePlane plane{seen.x[v[0]], seen.y[v[0]], wy * scale, -wx * scale, -uy * scale,
+                                  ux * scale,   ia,           ib - ia,    ic - ia};
         draw(plane, static_cast<std::uint32_t>(surface.planes.size()), box, grid);
         surface.planes.push_back(plane);
-        surface.triangle.push_back(static_cast<std::uint32_t>(t));
+        surface.lights.push_back(light_plane(plane, seen, v, static_cast<std::uint32_t>(t)));
         surface.first_column = std::min(surface.first_column, box.first_column);
         surface.end_column = std::max(surface.end_column, box.end_column);
         surface.first_row = std::min(surface.first_row, box.first_row);

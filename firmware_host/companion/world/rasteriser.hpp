@@ -78,18 +78,26 @@ struct SeenVertices {
 void project(const HelmetCamera& camera, const FaceView& view, const VertexArrays& position_mm,
              SeenVertices& seen);
 
-// Linear functions over the ideal plane around corner a: barycentrics of b and c (screen space).
+// Linear functions over the ideal plane around corner a: barycentrics of b and c (screen space), inverse
+// depth.
 struct TrianglePlane {
     float ax, ay;
     float bx, by;
     float cx, cy;
     float iz, iz_b, iz_c;  // inverse depth at a, and its change towards b and c
-    float light, light_b, light_c;
+};
+
+// Light as a linear function of a pixel's ray. Small and apart, because every pixel reads one.
+struct LightPlane {
+    float at_axis, per_x, per_y;
+    std::uint32_t triangle;
+
+    [[nodiscard]] float at(const IdealPoint& ray) const { return at_axis + per_x * ray.x + per_y * ray.y; }
 };
 
 struct SeenSurface {
-    std::vector<TrianglePlane> planes;    // front-facing triangles that reach the image
-    std::vector<std::uint32_t> triangle;  // of each plane
+    std::vector<TrianglePlane> planes;  // front-facing triangles that reach the image
+    std::vector<LightPlane> lights;     // of each plane
     int first_column = 0, end_column = 0, first_row = 0, end_row = 0;  // bounds of everything drawn
     std::vector<float> cover;  // per tile, once the first triangles are drawn: the least inverse depth in it
 };

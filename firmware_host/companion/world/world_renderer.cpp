@@ -151,13 +151,10 @@ void WorldRenderer::shade(const PixelGrid& grid) {
         for (int column = surface_.first_column; column < surface_.end_column; ++column) {
             const std::uint32_t index = grid.plane(column, row);
             if (index == kNothing) continue;
-            const TrianglePlane& plane = surface_.planes[index];
-            const IdealPoint ray = grid.ray(column, row);
-            const float dx = ray.x - plane.ax, dy = ray.y - plane.ay;
-            const float skin_dn = plane.light + plane.light_b * (plane.bx * dx + plane.by * dy) +
-                                  plane.light_c * (plane.cx * dx + plane.cy * dy);
-            const std::uint32_t triangle = surface_.triangle[index];
-            out[column] = face.dots_of(triangle).empty() ? skin_dn : paint(grid, column, row, index, skin_dn);
+            const LightPlane& light = surface_.lights[index];
+            const float skin_dn = light.at(grid.ray(column, row));
+            const bool painted = face.may_be_painted(light.triangle);
+            out[column] = painted ? paint(grid, column, row, index, skin_dn) : skin_dn;
         }
     }
 }
@@ -167,7 +164,7 @@ void WorldRenderer::shade(const PixelGrid& grid) {
 float WorldRenderer::paint(const PixelGrid& grid, int column, int row, std::uint32_t index, float skin_dn) {
     const PaintedFace& face = world_.face();
     const TrianglePlane& plane = surface_.planes[index];
-    const std::uint32_t triangle = surface_.triangle[index];
+    const std::uint32_t triangle = surface_.lights[index].triangle;
     const IdealPoint ray = grid.ray(column, row);
     const Int3& corner = face.triangles()[triangle];
     const auto radius = static_cast<float>(face.dot_radius_mm());
@@ -203,7 +200,7 @@ bool WorldRenderer::unhidden(std::size_t marker, const PixelAt& at, std::size_t 
     const std::uint32_t index =
         grids_[camera].plane(static_cast<int>(std::lround(at.x_px)), static_cast<int>(std::lround(at.y_px)));
     if (index == kNothing) return false;
-    const auto listed = world_.face().dots_of(surface_.triangle[index]);
+    const auto listed = world_.face().dots_of(surface_.lights[index].triangle);
     if (std::find(listed.begin(), listed.end(), marker) != listed.end()) return true;
     const TrianglePlane& plane = surface_.planes[index];
     const RaySlope slope = slope_of_pixel(eye, at.x_px, at.y_px);
