@@ -174,9 +174,9 @@ int benchmark(const World& world, const CameraControl& control) {
     std::sort(ms.begin(), ms.end());
     fmt::print(
         "{:.0f} images/s of {}x{} on one thread by processor time, {:.0f} by the wall clock\n"
-        "ms per image: mean {:.2f}, median {:.2f}, max {:.2f} ({} frames x {} cameras, {} triangles)\n",
+        "ms per image: least {:.2f}, median {:.2f}, mean {:.2f} ({} frames x {} cameras, {} triangles)\n",
         1e3 * static_cast<double>(ms.size()) / sum, world.cameras()[0].width_px, world.cameras()[0].height_px,
-        images / wall.count(), sum / static_cast<double>(ms.size()), ms[ms.size() / 2], ms.back(), ms.size(),
+        images / wall.count(), ms.front(), ms[ms.size() / 2], sum / static_cast<double>(ms.size()), ms.size(),
         world.cameras().size(), world.face().triangles().size());
     return kExitOk;
 }
