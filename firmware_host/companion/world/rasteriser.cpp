@@ -56,20 +56,19 @@ RIG_INLINE Bounds bounds_of(int width_px, int height_px, const SeenVertices& see
             clamped(top - bend + 0.999F, height_px), clamped(bottom + bend + 1.0F, height_px)};
 }
 
-// Four pixels at once, as a vector that every compiler of this project lays out alike.
-using Floats = float __attribute__((vector_size(16)));
-using Masks = std::int32_t __attribute__((vector_size(16)));
+// Eight pixels at once, as a vector that every compiler of this project lays out alike.
+using Floats = float __attribute__((vector_size(32)));
+using Masks = std::int32_t __attribute__((vector_size(32)));
 
-RIG_INLINE Floats floats(const std::array<float, kWide>& from) {
-    Floats v;
-    std::memcpy(&v, from.data(), sizeof(v));
-    return v;
+// By reference: how vectors are passed by value depends on the instruction set.
+RIG_INLINE void read(const std::array<float, kWide>& from, Floats& into) {
+    std::memcpy(&into, from.data(), sizeof(into));
 }
 
-RIG_INLINE bool any(Masks mask) {
-    std::array<std::uint64_t, 2> halves{};
-    std::memcpy(halves.data(), &mask, sizeof(mask));
-    return (halves[0] | halves[1]) != 0;
+RIG_INLINE bool any(const Masks& mask) {
+    std::array<std::uint64_t, 4> parts{};
+    std::memcpy(parts.data(), &mask, sizeof(mask));
+    return ((parts[0] | parts[1]) | (parts[2] | parts[3])) != 0;
 }
 
 // Each pixel is tested with its own ray, so pixels of a group that lie beyond the box do no harm.
@@ -81,12 +80,15 @@ RIG_INLINE void draw(const TrianglePlane& plane, std::uint32_t index, const Boun
         PixelGroup* groups = grid.row(row);
         for (int g = first; g < end; ++g) {
             PixelGroup& group = groups[g];
-            const Floats dx = floats(group.x) - plane.ax;
-            const Floats dy = floats(group.y) - plane.ay;
+            Floats dx, dy, old;
+            read(group.x, dx);
+            read(group.y, dy);
+            read(group.inverse_depth, old);
+            dx -= plane.ax;
+            dy -= plane.ay;
             const Floats b = plane.bx * dx + plane.by * dy;
             const Floats c = plane.cx * dx + plane.cy * dy;
             const Floats nearness = plane.iz + plane.iz_b * b + plane.iz_c * c;
-            const Floats old = floats(group.inverse_depth);
             const Masks wins =
                 (b >= kEdgeSlack) & (c >= kEdgeSlack) & (b + c <= 1.0F - kEdgeSlack) & (nearness > old);
             if (!any(wins)) continue;
@@ -127,7 +129,8 @@ void measure_cover(const PixelGrid& grid, const SeenSurface& drawn, std::vector<
     for (int row = drawn.first_row / kTile_px; row < drawn.end_row / kTile_px; ++row) {
         for (int column = drawn.first_column / kTile_px;
              column < (drawn.end_column + kTile_px - 1) / kTile_px; ++column) {
-            std::array<float, kWide> least_of = {1.0F, 1.0F, 1.0F, 1.0F};  // nothing is nearer than 1 mm
+            std::array<float, kWide> least_of{};
+            least_of.fill(1.0F);  // nothing is nearer than 1 mm
             for (int y = row * kTile_px; y < (row + 1) * kTile_px; ++y) {
                 const PixelGroup* groups = grid.row(y);
                 const int end = std::min((column + 1) * kTile_px, grid.width_px());
@@ -138,7 +141,7 @@ void measure_cover(const PixelGrid& grid, const SeenSurface& drawn, std::vector<
                 }
             }
             cover[static_cast<std::size_t>(row * across + column)] =
-                std::min({least_of[0], least_of[1], least_of[2], least_of[3]});
+                *std::min_element(least_of.begin(), least_of.end());
         }
     }
 }

@@ -13,9 +13,9 @@
 namespace rig::host {
 
 inline constexpr std::uint32_t kNothing = 0xFFFFFFFFU;
-inline constexpr int kWide = 4;
+inline constexpr int kWide = 8;
 
-// Four pixels of a row, in one cache line. x, y: the pixel's ray on the undistorted image plane, in pixels
+// Eight pixels of a row, in two cache lines. x, y: the pixel's ray on the undistorted image plane, in pixels
 // from the optical axis ("ideal px": f X / Z, f Y / Z); NaN where the lens formula does not reach, which sees
 // nothing.
 struct alignas(64) PixelGroup {
@@ -23,7 +23,7 @@ struct alignas(64) PixelGroup {
     std::array<float, kWide> inverse_depth;  // 1/mm, 0 where nothing is
     std::array<std::uint32_t, kWide> plane;  // index into SeenSurface::planes, or kNothing
 };
-static_assert(sizeof(PixelGroup) == 64);
+static_assert(sizeof(PixelGroup) == 128);
 
 struct IdealPoint {
     float x, y;
