@@ -9,12 +9,16 @@ namespace rig {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kLn2High = 6.93147180369123816490e-01;  // ln 2 split so that k * high is exact for |k| < 2^20
+constexpr double kLn2High =
+    6.93147180369123816490e-01;  // ln 2 split so that k * high is exact for |k| < 2^20
 constexpr double kLn2Low = 1.90821492927058770002e-10;
 constexpr double kInvLn2 = 1.44269504088896338700;
-constexpr double kHalfPiHigh = 1.57079632673412561417e+00;  // pi / 2 in three parts, each product with k exact
+constexpr double kHalfPiHigh =
+    1.57079632673412561417e+00;  // pi / 2 in three parts, each product with k exact
 constexpr double kHalfPiMid = 6.07710050630396597660e-11;
 constexpr double kHalfPiLow = 2.02226624879595063154e-21;
+
+constexpr double kMaxRadians = 1e6;
 
 double round_to_nearest(double x) {
     constexpr double kShift = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to an integer
@@ -24,14 +28,17 @@ double round_to_nearest(double x) {
 double scale_by_power_of_two(double x, int k) {
     // Two steps keep subnormal results correctly scaled.
     const int half = k / 2;
-    const auto power = [](int e) { return std::bit_cast<double>(static_cast<std::uint64_t>(e + 1023) << 52); };
+    const auto power = [](int e) {
+        return std::bit_cast<double>(static_cast<std::uint64_t>(e + 1023) << 52);
+    };
     return x * power(half) * power(k - half);
 }
 
 double sin_polynomial(double x) {
     // Taylor to x^17 on |x| <= pi/4: truncation under 1e-17.
-    constexpr std::array<double, 8> kC{-1.0 / 6,         1.0 / 120,         -1.0 / 5040,         1.0 / 362880,
-                                       -1.0 / 39916800, 1.0 / 6227020800, -1.0 / 1307674368000, 1.0 / 355687428096000};
+    constexpr std::array<double, 8> kC{
+        -1.0 / 6,        1.0 / 120,        -1.0 / 5040,          1.0 / 362880,
+        -1.0 / 39916800, 1.0 / 6227020800, -1.0 / 1307674368000, 1.0 / 355687428096000};
     const double x2 = x * x;
     double sum = 0.0;
     for (std::size_t i = kC.size(); i-- > 0;) sum = (sum + kC[i]) * x2;
@@ -39,8 +46,9 @@ double sin_polynomial(double x) {
 }
 
 double cos_polynomial(double x) {
-    constexpr std::array<double, 8> kC{-1.0 / 2,       1.0 / 24,         -1.0 / 720,         1.0 / 40320,
-                                       -1.0 / 3628800, 1.0 / 479001600, -1.0 / 87178291200, 1.0 / 20922789888000};
+    constexpr std::array<double, 8> kC{
+        -1.0 / 2,       1.0 / 24,        -1.0 / 720,         1.0 / 40320,
+        -1.0 / 3628800, 1.0 / 479001600, -1.0 / 87178291200, 1.0 / 20922789888000};
     const double x2 = x * x;
     double sum = 0.0;
     for (std::size_t i = kC.size(); i-- > 0;) sum = (sum + kC[i]) * x2;
@@ -80,15 +88,23 @@ double exp(double x) {
 }
 
 SinCos sin_cos(double radians) {
+    // Beyond, the products with the parts of pi / 2 are not exact any more, and far beyond k is no integer.
+    if (!(radians >= -kMaxRadians && radians <= kMaxRadians)) {
+        return {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
+    }
     const double k = round_to_nearest(radians * (2.0 / kPi));
     const double r = ((radians - k * kHalfPiHigh) - k * kHalfPiMid) - k * kHalfPiLow;
     const double s = sin_polynomial(r);
     const double c = cos_polynomial(r);
     switch (static_cast<std::int64_t>(k) & 3) {
-        case 0: return {s, c};
-        case 1: return {c, -s};
-        case 2: return {-s, -c};
-        default: return {-c, s};
+        case 0:
+            return {s, c};
+        case 1:
+            return {c, -s};
+        case 2:
+            return {-s, -c};
+        default:
+            return {-c, s};
     }
 }
 

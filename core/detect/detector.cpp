@@ -11,12 +11,49 @@ namespace rig {
 namespace {
 
 constexpr int kCorePixels = 3;  // beyond one and a half thresholds
-constexpr std::array<double, 2> kSplitDepths = {0.5, 0.75};  // of a component's own contrast
+constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
+                                                           0.75};  // of a component's own range of grey
+constexpr double kFringe = 4.0;           // px by which blur and noise lengthen a component
+constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual marker
+constexpr double kSureBadness = 0.7;      // below: good enough to say what the markers of this image are like
+constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
+constexpr double kHopelessBadness = 1.5;  // score 0
 
 // The least pixels a disc of the least diameter shows above mid contrast, with a margin for blur.
 std::uint32_t least_area(const BlobLimits& limits) {
     const double area = 0.5 * 0.785398 * limits.min_diameter_px * limits.min_diameter_px;
     return area < 2.0 ? 2U : static_cast<std::uint32_t>(area);
+}
+
+std::span<const Run> members_of(const Component& component, std::span<const Run> grouped) {
+    return grouped.subspan(component.first, component.count);
+}
+
+const std::uint8_t* levels_of(const BlockGrid& thresholds, int y) {
+    return &thresholds
+                .values[static_cast<std::size_t>(y) / kBlockPx * static_cast<std::size_t>(thresholds.width)];
+}
+
+// The parts of `runs` for which inside(x, y) holds, as runs.
+template <class Inside>
+std::size_t cut(std::span<const Run> runs, std::span<Run> out, bool& truncated, Inside inside) {
+    std::size_t count = 0;
+    for (const Run& run : runs) {
+        if (out.size() - count < static_cast<std::size_t>(run.end - run.begin) / 2 + 1) {
+            truncated = true;
+            break;
+        }
+        int begin = -1;
+        for (int x = run.begin; x <= run.end; ++x) {
+            const bool in = x < run.end && inside(x, run.y);
+            if (in && begin < 0) begin = x;
+            if (!in && begin >= 0) {
+                out[count++] = {run.y, static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(x)};
+                begin = -1;
+            }
+        }
+    }
+    return count;
 }
 
 bool in_range(double value, double low, double high) {
@@ -31,18 +68,47 @@ void add_reports(DetectorReport& total, const DetectorReport& side) {
     total.blobs_full |= side.blobs_full;
 }
 
+std::size_t cut_at_background(const Detector::Search& search, std::span<const Run> runs, std::span<Run> out,
+                              bool& truncated) {
+    const bool dark = search.side == Side::kBelow;
+    return cut(runs, out, truncated, [&](int x, int y) {
+        const int value = search.image.row(y)[x];
+        const int level = levels_of(search.thresholds, y)[static_cast<std::size_t>(x) / kBlockPx];
+        return dark ? value < level : value > level;
+    });
+}
+
+std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span<const Run> runs,
+                         std::span<Run> out, bool& truncated) {
+    const std::uint8_t turn = search.side == Side::kBelow ? 255 : 0;
+    int deepest = 0;
+    int shallowest = 255;
+    for (const Run& run : runs) {
+        const std::uint8_t* pixels = search.image.row(run.y);
+        for (int x = run.begin; x < run.end; ++x) {
+            deepest = std::max(deepest, pixels[x] ^ turn);
+            shallowest = std::min(shallowest, pixels[x] ^ turn);
+        }
+    }
+    const int level = shallowest + static_cast<int>(depth * (deepest - shallowest));
+    return cut(runs, out, truncated, [&](int x, int y) { return (search.image.row(y)[x] ^ turn) > level; });
+}
+
 }  // namespace
 
 Result<void, DetectorError> Detector::configure(const DetectorConfig& config) {
     const BlobLimits& blob = config.blob;
-    if (!in_range(blob.max_diameter_px, 3.0, kMaxDotDiameterPx) || !in_range(blob.min_diameter_px, 2.0, blob.max_diameter_px)) {
+    if (!in_range(blob.max_diameter_px, 3.0, kMaxDotDiameterPx) ||
+        !in_range(blob.min_diameter_px, 2.0, blob.max_diameter_px)) {
         return failure(DetectorError::kDiameters);
     }
     if (!in_range(blob.min_contrast, 3.0, 128.0) || !in_range(config.relative_contrast, 0.0, 0.9)) {
         return failure(DetectorError::kContrast);
     }
-    if (!in_range(blob.max_aspect, 1.0, 100.0) || !in_range(blob.max_deviation, 0.0, 1.0) ||
-        !in_range(blob.max_open, 0.01, 1.0) || !in_range(config.size_ratio, 1.0, 100.0) || config.size_quorum < 3) {
+    if (!in_range(blob.max_aspect, 1.01, 100.0) || !in_range(blob.max_deviation, 0.0, 1.0) ||
+        !in_range(blob.max_deviation_px, 0.01, 10.0) || !in_range(blob.max_open, 0.01, 1.0) ||
+        !in_range(config.size_ratio, 1.01, 100.0) || !in_range(config.ink_spread, 0.01, 100.0) ||
+        !in_range(config.retro_spread, 0.01, 100.0) || config.size_quorum < 3) {
         return failure(DetectorError::kShape);
     }
     if (!in_range(config.min_score, 0.0, 1.0)) return failure(DetectorError::kScore);
@@ -59,14 +125,16 @@ void Detector::measure_exposure(const ImageView& image, DetectorReport& report) 
     const LumaSums sums = luma_sums(image);
     report.mean_luma = static_cast<double>(sums.sum) / sums.samples;
     report.saturated_fraction = static_cast<double>(sums.saturated) / sums.samples;
-    if (report.mean_luma < config_.dark_luma) report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kDark);
+    if (report.mean_luma < config_.dark_luma)
+        report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kDark);
     if (report.saturated_fraction > config_.saturated_fraction) {
         report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kFlooded);
     }
     if (state_.usual_luma >= 0.0) {
         const double change = report.mean_luma - state_.usual_luma;
         const double allowed = config_.luma_step * std::max(state_.usual_luma, 1.0);
-        if (change > allowed || change < -allowed) report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kStep);
+        if (change > allowed || change < -allowed)
+            report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kStep);
         state_.usual_luma += 0.25 * change;  // a lasting change is the new normal within some ten frames
     } else {
         state_.usual_luma = report.mean_luma;
@@ -74,11 +142,12 @@ void Detector::measure_exposure(const ImageView& image, DetectorReport& report) 
     if (report.exposure != 0) report.faults |= fault_bit(Fault::kExposure);
 }
 
-// The background is what remains when everything narrower than the largest disc is taken away (a closing for dark
-// discs, an opening for bright ones); a pixel is a candidate when it differs from it by a part of it.
-void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side) const {
+// The background is what remains when everything narrower than the largest disc is taken away (a closing for
+// dark discs, an opening for bright ones); a pixel is a candidate when it differs from it by a part of it.
+void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side,
+                              double largest_px) const {
     std::copy(means.values.begin(), means.values.end(), thresholds.values.begin());
-    const int radius = (static_cast<int>(config_.blob.max_diameter_px) / static_cast<int>(kBlockPx) + 2) / 2;
+    const int radius = (static_cast<int>(largest_px) / static_cast<int>(kBlockPx) + 2) / 2;
     const int least = static_cast<int>(config_.blob.min_contrast);
     const int part = static_cast<int>(config_.relative_contrast * 256.0);
     if (side == Side::kBelow) {
@@ -90,21 +159,21 @@ void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& threshold
     }
     for (std::uint8_t& level : thresholds.values) {
         const int step = std::max(least, level * part >> 8);
-        level = static_cast<std::uint8_t>(side == Side::kBelow ? std::max(0, level - step) : std::min(250, level + step));
+        level = static_cast<std::uint8_t>(side == Side::kBelow ? std::max(0, level - step)
+                                                               : std::min(250, level + step));
     }
 }
 
 // Texture and noise just reach the threshold; a marker whose mid contrast does has pixels well beyond it.
-bool Detector::has_core(const ImageView& image, const BlockGrid& thresholds, Side side, std::span<const Run> runs) const {
+bool Detector::has_core(const Search& search, std::span<const Run> runs) const {
     const int least = static_cast<int>(config_.blob.min_contrast);
     const int part = static_cast<int>(config_.relative_contrast * 256.0);
-    const int whole = side == Side::kBelow ? 256 - part : 256 + part;
-    const int sign = side == Side::kBelow ? 1 : -1;
+    const int whole = search.side == Side::kBelow ? 256 - part : 256 + part;
+    const int sign = search.side == Side::kBelow ? 1 : -1;
     int deep = 0;
     for (const Run& run : runs) {
-        const std::uint8_t* pixels = image.row(run.y);
-        const std::uint8_t* levels = &thresholds.values[static_cast<std::size_t>(run.y / kBlockPx) *
-                                                        static_cast<std::size_t>(thresholds.width)];
+        const std::uint8_t* pixels = search.image.row(run.y);
+        const std::uint8_t* levels = levels_of(search.thresholds, run.y);
         for (std::size_t x = run.begin; x < run.end; ++x) {
             const int level = levels[x / kBlockPx];
             const int step = std::max(least, level * part / whole);
@@ -119,121 +188,133 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     Workspace& w = workspace_;
     result.blobs.clear();
     result.report = DetectorReport{};
+    w.failed.clear();
     const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
-    set_thresholds(means, thresholds, side);
+    set_thresholds(means, thresholds, side, config_.blob.max_diameter_px);
     const std::size_t count = threshold_runs(image, thresholds, side, w.runs, result.report.runs_full);
     result.report.runs = static_cast<std::uint32_t>(count);
-    const ComponentCounts counts = connect(std::span<const Run>(w.runs).first(count), {least_area(config_.blob)},
-                                           {w.parents, w.areas, w.grouped, w.components});
+    const ComponentCounts counts =
+        connect(std::span<const Run>(w.runs).first(count), {least_area(config_.blob)},
+                {w.parents, w.areas, w.grouped, w.components});
     result.report.blobs_full = counts.dropped > 0;
+    const Search search{image, thresholds, side, config_.blob.max_diameter_px};
     for (std::size_t c = 0; c < counts.components; ++c) {
-        const Component component = w.components[c];
-        const std::span<const Run> members = std::span<const Run>(w.grouped).subspan(component.first, component.count);
-        if (!has_core(image, thresholds, side, members)) {
-            ++result.report.rejected[static_cast<std::size_t>(Rejection::kFaint)];
-            continue;
-        }
-        examine(image, side, component, members, result);
+        const Component& component = w.components[c];
+        if (examine(search, component, members_of(component, w.grouped), {}, result)) continue;
+        if (!w.failed.push_back(static_cast<std::uint16_t>(c))) result.report.blobs_full = true;
     }
-    apply_population(result);
+    split_failed(image, means, side, result);
+    apply_population(side, result);
 }
 
-void Detector::examine(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,
-                       SideResult& result) {
-    const Blob blob = measure_blob(image, side, component, runs, config_.blob, workspace_.blob);
-    ++result.report.candidates;
-    if (blob.rejection == Rejection::kNone) {
-        if (!result.blobs.push_back(blob)) result.report.blobs_full = true;
-        return;
-    }
-    ++result.report.rejected[static_cast<std::size_t>(blob.rejection)];
-    if (blob.rejection != Rejection::kSmall && blob.rejection != Rejection::kFaint) {
-        split(image, side, component, runs, result);
-    }
-}
-
-// A marker that hangs together with a shadow, a line or another marker stands alone at some deeper threshold.
-void Detector::split(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,
-                     SideResult& result) {
+// Blobs that are no markers may hold some: a marker hangs together with a shadow, a strip of light or another
+// marker. Now that the size of the image's markers is known, the background is taken at that scale.
+void Detector::split_failed(const ImageView& image, const BlockGrid& means, Side side, SideResult& result) {
     Workspace& w = workspace_;
-    int deepest = 0;
-    const std::uint8_t turn = side == Side::kBelow ? 255 : 0;
-    int shallow = 255;
-    for (const Run& run : runs) {
-        const std::uint8_t* pixels = image.row(run.y);
-        for (int x = run.begin; x < run.end; ++x) {
-            const int value = pixels[x] ^ turn;
-            deepest = std::max(deepest, value);
-            shallow = std::min(shallow, value);
-        }
+    if (w.failed.empty()) return;
+    const double usual = usual_size(result.blobs);
+    const double largest = usual > 0.0 ? std::min(usual * kSizeMargin, config_.blob.max_diameter_px)
+                                       : config_.blob.max_diameter_px;
+    const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
+    set_thresholds(means, thresholds, side, largest);
+    const Search search{image, thresholds, side, largest};
+    for (const std::uint16_t c : w.failed) {
+        const Component& component = w.components[c];
+        split(search, 0, component, members_of(component, w.grouped), result);
     }
-    for (const double depth : kSplitDepths) {
-        const int level = shallow + static_cast<int>(depth * (deepest - shallow));
-        std::size_t count = 0;
-        for (const Run& run : runs) {
-            if (w.split_runs.size() - count < static_cast<std::size_t>(run.end - run.begin) / 2 + 1) {
-                result.report.runs_full = true;
-                break;
-            }
-            const std::uint8_t* pixels = image.row(run.y);
-            int begin = -1;
-            for (int x = run.begin; x <= run.end; ++x) {
-                const bool inside = x < run.end && (pixels[x] ^ turn) > level;
-                if (inside && begin < 0) begin = x;
-                if (!inside && begin >= 0) {
-                    w.split_runs[count++] = {run.y, static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(x)};
-                    begin = -1;
-                }
-            }
-        }
-        const ComponentCounts counts =
-            connect(std::span<const Run>(w.split_runs).first(count), {least_area(config_.blob)},
-                    {w.parents, w.areas, w.split_grouped, w.split_components});
-        result.report.blobs_full |= counts.dropped > 0;
-        for (std::size_t c = 0; c < counts.components; ++c) {
-            const Component& part = w.split_components[c];
-            const Blob blob = measure_blob(image, side, part,
-                                           std::span<const Run>(w.split_grouped).subspan(part.first, part.count),
-                                           config_.blob, w.blob);
-            ++result.report.candidates;
-            if (blob.rejection != Rejection::kNone) {
-                ++result.report.rejected[static_cast<std::size_t>(blob.rejection)];
-                continue;
-            }
-            // Found at both depths: the first stands.
-            const auto same = [&](const Blob& other) {
-                const double dx = other.x_px - blob.x_px;
-                const double dy = other.y_px - blob.y_px;
-                return dx * dx + dy * dy < 0.25 * blob.diameter_px * blob.diameter_px;
-            };
-            if (std::any_of(result.blobs.begin(), result.blobs.end(), same)) continue;
-            if (!result.blobs.push_back(blob)) result.report.blobs_full = true;
-        }
-    }
-    (void)component;
 }
 
-// The markers of one image are of one make: sizes far from the median are eyes, nostrils, teeth or moles.
-void Detector::apply_population(SideResult& result) const {
+// True if the blob is done with: a marker, or so faint or small that nothing is inside it either.
+bool Detector::examine(const Search& search, const Component& component, std::span<const Run> runs,
+                       const Siblings& siblings, SideResult& result) {
+    const auto reject = [&](Rejection reason) { ++result.report.rejected[static_cast<std::size_t>(reason)]; };
+    if (!has_core(search, runs)) {
+        reject(Rejection::kFaint);
+        return true;
+    }
+    const int longest = std::max(component.right - component.left, component.bottom - component.top) + 1;
+    if (longest > search.largest_px + kFringe) {
+        reject(Rejection::kLarge);
+        return false;
+    }
+    const Blob blob =
+        measure_blob(search.image, search.side, component, runs, siblings, config_.blob, workspace_.blob);
+    ++result.report.candidates;
+    if (blob.rejection != Rejection::kNone) {
+        reject(blob.rejection);
+        return blob.rejection == Rejection::kSmall || blob.rejection == Rejection::kFaint;
+    }
+    if (!result.blobs.push_back(blob)) result.report.blobs_full = true;
+    return true;
+}
+
+// Level 0 cuts at the local background, deeper levels at a part of the component's own range of grey.
+void Detector::split(const Search& search, std::size_t level, const Component& component,
+                     std::span<const Run> runs, SideResult& result) {
+    Workspace& w = workspace_;
+    SplitStorage& storage = w.split[level];
+    bool truncated = false;
+    const std::size_t count = level == 0
+                                  ? cut_at_background(search, runs, storage.runs, truncated)
+                                  : cut_at_depth(search, kSplitDepths[level], runs, storage.runs, truncated);
+    result.report.runs_full |= truncated;
+    const ComponentCounts counts =
+        connect(std::span<const Run>(storage.runs).first(count), {least_area(config_.blob)},
+                {w.parents, w.areas, storage.grouped, storage.components});
+    result.report.blobs_full |= counts.dropped > 0;
+    const Siblings all{std::span<const Component>(storage.components).first(counts.components),
+                       storage.grouped};
+    const bool whole = counts.components == 1 && storage.components[0].area_px == component.area_px;
+    for (std::size_t c = 0; c < counts.components; ++c) {
+        const Component& part = storage.components[c];
+        const std::span<const Run> members = members_of(part, storage.grouped);
+        if (!whole && examine(search, part, members, all, result)) continue;
+        if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
+    }
+}
+
+double Detector::usual_size(const Blobs& blobs) const {
     std::array<float, kMaxCandidates> sizes{};
     std::size_t count = 0;
-    for (const Blob& blob : result.blobs) {
-        if (blob.score >= 0.4) sizes[count++] = static_cast<float>(blob.long_axis_px);
+    for (const Blob& blob : blobs) {
+        if (blob.badness < kSureBadness) sizes[count++] = static_cast<float>(blob.long_axis_px);
     }
-    if (count >= config_.size_quorum) {
-        const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(count / 2);
-        std::nth_element(sizes.begin(), middle, sizes.begin() + static_cast<std::ptrdiff_t>(count));
-        const double median = static_cast<double>(*middle);
-        for (Blob& blob : result.blobs) {
-            const double ratio = blob.long_axis_px / median;
-            if (ratio <= config_.size_ratio && ratio * config_.size_ratio >= 1.0) continue;
-            blob.rejection = Rejection::kOddSize;
-            ++result.report.rejected[static_cast<std::size_t>(Rejection::kOddSize)];
-        }
+    if (count < config_.size_quorum) return 0.0;
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(sizes.begin(), middle, sizes.begin() + static_cast<std::ptrdiff_t>(count));
+    return static_cast<double>(*middle);
+}
+
+double Detector::usual_depth(const Blobs& blobs) const {
+    std::array<float, kMaxCandidates> depths{};
+    std::size_t count = 0;
+    for (const Blob& blob : blobs) {
+        if (blob.badness < kSureBadness) depths[count++] = static_cast<float>(blob.depth);
     }
+    if (count < config_.size_quorum) return 0.0;
+    const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(depths.begin(), middle, depths.begin() + static_cast<std::ptrdiff_t>(count));
+    return static_cast<double>(*middle);
+}
+
+// The markers of one image are of one make: sizes and depths of ink far from the median are eyes, nostrils,
+// teeth, moles or shadows. Without enough sure markers nothing is said.
+void Detector::apply_population(Side side, SideResult& result) const {
+    const double size = usual_size(result.blobs);
+    const double depth = usual_depth(result.blobs);
+    const double spread = side == Side::kBelow ? config_.ink_spread : config_.retro_spread;
     result.quality = 0.0;
-    for (const Blob& blob : result.blobs) {
-        if (blob.rejection == Rejection::kNone) result.quality += blob.score * std::min(1.0, blob.contrast / 40.0);
+    for (Blob& blob : result.blobs) {
+        if (size > 0.0) {
+            const double ratio =
+                blob.long_axis_px > size ? blob.long_axis_px / size : size / blob.long_axis_px;
+            blob.badness += std::max(0.0, ratio - 1.0) / (config_.size_ratio - 1.0);
+        }
+        if (depth > 0.0 && blob.depth < depth) {
+            blob.badness += (depth - blob.depth) / (depth * spread);
+        }
+        blob.score = std::clamp(1.0 - blob.badness / kHopelessBadness, 0.0, 1.0);
+        result.quality += blob.score * std::min(1.0, blob.contrast / 40.0);
     }
 }
 
@@ -259,20 +340,41 @@ void Detector::hand_on(const SideResult& result, Observations& observations, Det
     float least = 0.0F;
     if (good > kMaxObservations) {
         const auto last = scores.begin() + static_cast<std::ptrdiff_t>(kMaxObservations - 1);
-        std::nth_element(scores.begin(), last, scores.begin() + static_cast<std::ptrdiff_t>(good), [](float a, float b) { return a > b; });
+        std::nth_element(scores.begin(), last, scores.begin() + static_cast<std::ptrdiff_t>(good),
+                         [](float a, float b) { return a > b; });
         least = *last;
     }
     for (const Blob& blob : result.blobs) {
         if (blob.rejection != Rejection::kNone || blob.score < config_.min_score) continue;
         const auto score = static_cast<float>(blob.score);
         const Observation seen{static_cast<float>(blob.x_px), static_cast<float>(blob.y_px),
-                               static_cast<float>(blob.diameter_px), static_cast<float>(std::min(1.0, blob.contrast / 255.0)),
-                               score};
+                               static_cast<float>(blob.diameter_px),
+                               static_cast<float>(std::min(1.0, blob.contrast / 255.0)), score};
         if (score < least || !observations.push_back(seen)) {
             ++report.left_out;
             report.observations_full = true;
         }
     }
+}
+
+// Which side the markers are on. Both are tried until the decision has settled, and again when that side
+// fails.
+std::size_t Detector::look(const ImageView& image, const BlockGrid& means, DetectorReport& report) {
+    Workspace& w = workspace_;
+    const auto try_side = [&](std::size_t index) {
+        detect_side(image, means, index == 0 ? Side::kBelow : Side::kAbove, w.sides[index]);
+        add_reports(report, w.sides[index].report);
+    };
+    const bool automatic = config_.polarity == MarkerPolarity::kAuto;
+    const MarkerPolarity likely = automatic ? state_.polarity : config_.polarity;
+    const std::size_t first = likely == MarkerPolarity::kBright ? 1 : 0;
+    try_side(first);
+    if (!automatic) return first;
+    if (state_.agreed >= config_.polarity_frames && w.sides[first].quality >= kSettledQuality) return first;
+    try_side(1 - first);
+    const std::size_t chosen = w.sides[1].quality > w.sides[0].quality ? 1 : 0;
+    decide(chosen);
+    return chosen;
 }
 
 void Detector::detect(const ImageView& image, Observations& observations, DetectorReport& report) {
@@ -285,21 +387,7 @@ void Detector::detect(const ImageView& image, Observations& observations, Detect
     measure_exposure(image, report);
     Workspace& w = workspace_;
     const BlockGrid means = block_means(image, w.means);
-    MarkerPolarity polarity = config_.polarity;
-    if (polarity == MarkerPolarity::kAuto && state_.agreed >= config_.polarity_frames) polarity = state_.polarity;
-    std::size_t chosen = polarity == MarkerPolarity::kBright ? 1 : 0;
-    if (polarity == MarkerPolarity::kAuto) {
-        detect_side(image, means, Side::kBelow, w.sides[0]);
-        detect_side(image, means, Side::kAbove, w.sides[1]);
-        chosen = w.sides[1].quality > w.sides[0].quality ? 1 : 0;
-        add_reports(report, w.sides[0].report);
-        add_reports(report, w.sides[1].report);
-        decide(chosen);
-    } else {
-        const Side side = chosen == 0 ? Side::kBelow : Side::kAbove;
-        detect_side(image, means, side, w.sides[chosen]);
-        add_reports(report, w.sides[chosen].report);
-    }
+    const std::size_t chosen = look(image, means, report);
     report.polarity = chosen == 0 ? MarkerPolarity::kDark : MarkerPolarity::kBright;
     hand_on(w.sides[chosen], observations, report);
     if (report.runs_full || report.blobs_full || report.observations_full) {

@@ -74,38 +74,6 @@ Result<void, PackError> check_scalars(const PackManifest& manifest) {
     return {};
 }
 
-Result<void, PackError> check_camera(const CameraModel& camera) {
-    const auto inside = [](double x, double low, double high) {
-        return is_finite(x) && x >= low && x <= high;
-    };
-    const double width = camera.width_px;
-    const double height = camera.height_px;
-    const bool plausible = camera.width_px >= 1 && camera.width_px <= static_cast<int>(kMaxImageWidth) &&
-                           camera.height_px >= 1 && camera.height_px <= static_cast<int>(kMaxImageHeight) &&
-                           inside(camera.fx_px, 1.0, 1e5) && inside(camera.fy_px, 1.0, 1e5) &&
-                           inside(camera.cx_px, -width, 2.0 * width) &&
-                           inside(camera.cy_px, -height, 2.0 * height) && inside(camera.k1, -10.0, 10.0) &&
-                           inside(camera.k2, -10.0, 10.0) && inside(camera.k3, -10.0, 10.0) &&
-                           inside(camera.p1, -1.0, 1.0) && inside(camera.p2, -1.0, 1.0);
-    if (!plausible) return failure(PackError::kCameraIntrinsics);
-    const Mat3& r = camera.camera_from_headset;
-    for (int i = 0; i < 9; ++i) {
-        if (!inside(r(i / 3, i % 3), -2.0, 2.0)) return failure(PackError::kCameraRotation);
-    }
-    const Mat3 gram = r * r.transpose();
-    for (int i = 0; i < 9; ++i) {
-        const double error = gram(i / 3, i % 3) - (i % 4 == 0 ? 1.0 : 0.0);
-        if (!inside(error, -kRotationTolerance, kRotationTolerance))
-            return failure(PackError::kCameraRotation);
-    }
-    const Vec3 third = r.row(0).transpose().cross(r.row(1).transpose());
-    if (third.dot(r.row(2).transpose()) <= 0.0) return failure(PackError::kCameraRotation);
-    for (int i = 0; i < 3; ++i) {
-        if (!inside(camera.centre_mm[i], -kMaxFaceMm, kMaxFaceMm)) return failure(PackError::kCameraRotation);
-    }
-    return {};
-}
-
 // Splits "a\nb\n" into exactly names.size() plain, distinct names.
 Result<void, PackError> read_names(ByteSpan bytes, std::span<std::string_view> names) {
     const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -232,6 +200,38 @@ void copy_scalars(const PackManifest& manifest, SolvePack& pack) {
 }
 
 }  // namespace
+
+Result<void, PackError> check_camera(const CameraModel& camera) {
+    const auto inside = [](double x, double low, double high) {
+        return is_finite(x) && x >= low && x <= high;
+    };
+    const double width = camera.width_px;
+    const double height = camera.height_px;
+    const bool plausible = camera.width_px >= 1 && camera.width_px <= static_cast<int>(kMaxImageWidth) &&
+                           camera.height_px >= 1 && camera.height_px <= static_cast<int>(kMaxImageHeight) &&
+                           inside(camera.fx_px, 1.0, 1e5) && inside(camera.fy_px, 1.0, 1e5) &&
+                           inside(camera.cx_px, -width, 2.0 * width) &&
+                           inside(camera.cy_px, -height, 2.0 * height) && inside(camera.k1, -10.0, 10.0) &&
+                           inside(camera.k2, -10.0, 10.0) && inside(camera.k3, -10.0, 10.0) &&
+                           inside(camera.p1, -1.0, 1.0) && inside(camera.p2, -1.0, 1.0);
+    if (!plausible) return failure(PackError::kCameraIntrinsics);
+    const Mat3& r = camera.camera_from_headset;
+    for (int i = 0; i < 9; ++i) {
+        if (!inside(r(i / 3, i % 3), -2.0, 2.0)) return failure(PackError::kCameraRotation);
+    }
+    const Mat3 gram = r * r.transpose();
+    for (int i = 0; i < 9; ++i) {
+        const double error = gram(i / 3, i % 3) - (i % 4 == 0 ? 1.0 : 0.0);
+        if (!inside(error, -kRotationTolerance, kRotationTolerance))
+            return failure(PackError::kCameraRotation);
+    }
+    const Vec3 third = r.row(0).transpose().cross(r.row(1).transpose());
+    if (third.dot(r.row(2).transpose()) <= 0.0) return failure(PackError::kCameraRotation);
+    for (int i = 0; i < 3; ++i) {
+        if (!inside(camera.centre_mm[i], -kMaxFaceMm, kMaxFaceMm)) return failure(PackError::kCameraRotation);
+    }
+    return {};
+}
 
 Result<SolvePack, PackError> open_pack(ByteSpan bytes, HashFunction hash) {
     const Result<PackManifest, PackError> manifest = read_manifest(bytes, hash);

@@ -15,4 +15,7 @@ namespace rig {
 // must outlive the result, which points into it. `hash` is SHA-256. Any bytes are safe; nothing is allocated.
 [[nodiscard]] Result<SolvePack, PackError> open_pack(ByteSpan bytes, HashFunction hash);
 
+// The rule for one camera: kCameraIntrinsics or kCameraRotation. Any numbers are safe.
+[[nodiscard]] Result<void, PackError> check_camera(const CameraModel& camera);
+
 }  // namespace rig

@@ -1,28 +1,31 @@
-// Takes the helmet's slip out: finds the rigid motion between the calibrated head and the markers as seen, and hands
-// the markers on in the face frame. No marker of a face is quiet, so the fit knows how the face itself may move:
-// it minimises (x - R b - t)^T C^-1 (x - R b - t) with C = B S B^T + s^2 I   (methods.md section 1; the idea of a rigid
-// fit is [Deng06 eq. 1-2], the covariance is ours). With one camera the same fit runs on the rays.
+// Takes the helmet's slip out: finds the rigid motion between the calibrated head and the markers as seen,
+// and hands the markers on in the face frame. No marker of a face is quiet, so the fit knows how the face
+// itself may move: it minimises (x - R b - t)^T C^-1 (x - R b - t) with C = B S B^T + s^2 I   (methods.md
+// section 1; the idea of a rigid fit is [Deng06 eq. 1-2], the covariance is ours). With one camera the same
+// fit runs on the rays.
 #pragma once
 
 #include <array>
 #include <cstdint>
 
 #include "core/geometry/shape_model.hpp"
+#include "core/stabilise/stabilised_markers.hpp"
 #include "core/track/named_markers.hpp"
 
 namespace rig {
 
 struct StabiliserConfig {
-    bool enabled = true;                 // false: the markers are in the face frame already
-    Rigid nominal;                       // headset_from_face as calibrated
-    double rotation_sigma_rad = 0.15;    // expected slip about the nominal pose
+    bool enabled = true;               // false: the markers are in the face frame already
+    Rigid nominal;                     // headset_from_face as calibrated
+    double rotation_sigma_rad = 0.15;  // expected slip about the nominal pose
     double translation_sigma_mm = 12.0;
-    // Between frames a helmet creeps; when it moves by more than jolt_sigmas of this, the frame is fitted without it.
+    // Between frames a helmet creeps; when it moves by more than jolt_sigmas of this, the frame is fitted
+    // without it.
     double step_rotation_sigma_rad = 0.0005;
     double step_translation_sigma_mm = 0.05;
     double jolt_sigmas = 2.5;
-    int first_iterations = 6;            // Gauss-Newton steps from a cold start
-    int iterations = 3;                  // ... from the previous frame
+    int first_iterations = 6;  // Gauss-Newton steps from a cold start
+    int iterations = 3;        // ... from the previous frame
 };
 
 struct StabiliserState {
@@ -36,22 +39,9 @@ struct StabiliserWorkspace {
     std::array<Mat3, kMaxMarkers> informations{};
 };
 
-struct StabilisedMarker {
-    bool seen = false;
-    Vec3 position_mm = Vec3::Zero();   // face frame
-    Mat3 information = Mat3::Zero();   // 1/mm^2, face frame; zero when not seen
-};
-
-struct StabiliserOutput {
-    std::uint16_t count = 0;
-    std::array<StabilisedMarker, kMaxMarkers> markers{};
-    Rigid headset_from_face;   // the slip: observed = R face + t
-    ShapeFit fit;              // pose and expression in the Gaussian's terms, for inference
-};
-
 struct StabiliserReport {
-    bool jolt = false;         // the helmet moved faster than it creeps
-    bool ok = false;           // false: too little was seen; the previous pose is used
+    bool jolt = false;  // the helmet moved faster than it creeps
+    bool ok = false;    // false: too little was seen; the previous pose is used
     double slip_rotation_rad = 0.0;
     double slip_translation_mm = 0.0;
 };

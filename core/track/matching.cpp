@@ -1,5 +1,7 @@
 #include "core/track/matching.hpp"
 
+#include <algorithm>
+
 #include "core/base/bounded_vector.hpp"
 #include "core/base/check.hpp"
 
@@ -8,6 +10,7 @@ namespace rig {
 namespace {
 
 constexpr double kDepthPriorSigmaMm = 3.0;  // of a predicted depth along a single ray
+constexpr double kMostPriorShare = 1e-3;    // of what a sighting measures: a prediction never pulls a measured point
 
 using MarkerSightings = BoundedVector<Sighting, kMaxCameras>;
 
@@ -19,6 +22,12 @@ void gather(const SightingSet& sightings, const Matches& matches, std::size_t ma
         const bool kept = out.push_back(sightings.views[view][static_cast<std::size_t>(at)]);
         RIG_CHECK(kept);
     }
+}
+
+double prior_information(const MarkerSightings& mine) {
+    double most = 1.0 / (kDepthPriorSigmaMm * kDepthPriorSigmaMm);
+    for (const Sighting& sighting : mine) most = std::min(most, kMostPriorShare * sighting.information);
+    return most;
 }
 
 // Takes away the match that lies farthest from the prediction.
@@ -60,7 +69,6 @@ void match_views(std::span<const Vec3> predicted_mm, const SightingSet& sighting
 
 void combine_views(std::span<const Vec3> predicted_mm, const SightingSet& sightings, double gap_limit_mm,
                    Matches& matches, NamedMarkers& named) {
-    constexpr double kPriorInformation = 1.0 / (kDepthPriorSigmaMm * kDepthPriorSigmaMm);
     named.count = static_cast<std::uint16_t>(predicted_mm.size());
     MarkerSightings mine;
     for (std::size_t k = 0; k < predicted_mm.size(); ++k) {
@@ -68,11 +76,11 @@ void combine_views(std::span<const Vec3> predicted_mm, const SightingSet& sighti
         marker = NamedMarker{};
         gather(sightings, matches, k, mine);
         if (mine.empty()) continue;
-        Triangulation point = triangulate(mine.span(), predicted_mm[k], kPriorInformation);
+        Triangulation point = triangulate(mine.span(), predicted_mm[k], prior_information(mine));
         while (mine.size() > 1 && point.gap_mm > gap_limit_mm) {
             drop_farthest(predicted_mm[k], sightings, k, matches);
             gather(sightings, matches, k, mine);
-            point = triangulate(mine.span(), predicted_mm[k], kPriorInformation);
+            point = triangulate(mine.span(), predicted_mm[k], prior_information(mine));
         }
         marker.seen = true;
         marker.views = sightings.from_cameras ? static_cast<std::uint8_t>(mine.size()) : std::uint8_t{0};

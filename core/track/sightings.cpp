@@ -40,7 +40,8 @@ void add_camera_view(const CameraModel& camera, std::span<const Observation> obs
 void add_point_view(std::span<const Vec3> points_mm, double sigma_mm, SightingSet& set) {
     RIG_CHECK(set.view_count < kMaxCameras);
     const std::size_t view = set.view_count++;
-    for (std::size_t i = 0; i < points_mm.size(); ++i) {
+    constexpr std::size_t kMostSlots = 65536;  // what a source index holds
+    for (std::size_t i = 0; i < std::min(points_mm.size(), kMostSlots); ++i) {
         // Beyond a metre from the rig's origin nothing is a marker, and squares stay far from overflow.
         constexpr double kReachMm = 1000.0;
         if (!finite(points_mm[i]) || points_mm[i].cwiseAbs().maxCoeff() > kReachMm) continue;

@@ -28,6 +28,7 @@ struct SightingSet {
 
     void clear() {
         view_count = 0;
+        from_cameras = false;
         for (auto& view : views) view.clear();
         for (auto& indices : source) indices.clear();
     }

@@ -66,13 +66,13 @@ void SystemdWatchdog::disarm() {
 
 void SystemdWatchdog::send(std::string_view message) const {
     if (!socket_.is_open()) return;
-    sockaddr_un manager{};
-    manager.sun_family = AF_UNIX;
-    std::memcpy(manager.sun_path, address_.data(), address_length_);
+    sockaddr_un supervisor{};
+    supervisor.sun_family = AF_UNIX;
+    std::memcpy(supervisor.sun_path, address_.data(), address_length_);
     const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + address_length_);
     static_cast<void>(os::system_call([&] {
         return sendto(socket_.get(), message.data(), message.size(), MSG_NOSIGNAL,
-                      reinterpret_cast<const sockaddr*>(&manager), length);
+                      reinterpret_cast<const sockaddr*>(&supervisor), length);
     }));
 }
 

@@ -25,6 +25,7 @@ Result<FrameFormat, FrameError> FaultyFrameSource::start() {
     own_images_.resize(static_cast<std::size_t>(borrow_limit()));
     for (OwnImage& image : own_images_) image.pixels.resize(bytes);
     frozen_pixels_.resize(bytes);
+    running_ = true;
     return format;
 }
 
@@ -33,6 +34,7 @@ void FaultyFrameSource::stop() {
     for (OwnImage& image : own_images_) image.borrowed = false;
     kept_ = KeptBack::kNothing;
     frozen_by_ = nullptr;
+    running_ = false;
     gone_ = false;
 }
 
@@ -69,6 +71,7 @@ bool FaultyFrameSource::kept_frame_is_due(std::int64_t deadline_us) {
 }
 
 Result<CameraFrame, FrameError> FaultyFrameSource::wait_frame(std::int64_t deadline_us) {
+    if (!running_) return failure(FrameError::kNotStarted);
     while (true) {
         gone_ = gone_ || active(FaultKind::kCameraGone, clock_.now_us()) != nullptr;
         if (gone_) return failure(FrameError::kGone);

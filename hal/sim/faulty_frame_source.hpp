@@ -56,6 +56,7 @@ class FaultyFrameSource final : public FrameSource {
     CameraFrame kept_back_;
     KeptBack kept_ = KeptBack::kNothing;
     std::int64_t kept_until_us_ = 0;
+    bool running_ = false;
     bool gone_ = false;
 };
 

@@ -216,23 +216,21 @@ WorldClient::Connection::Wake WorldClient::Connection::wait_message(Lock& lock, 
     return Wake::kMessage;
 }
 
+// A world that has hung up may still have left messages for us, its end perhaps: reading finds out, sending
+// only stops.
 void WorldClient::Connection::send(const WorldMessage& message, const Lock&) {
     ByteSpan rest = std::as_bytes(std::span(&message, 1));
-    while (!rest.empty() && !is_down()) {
+    while (!rest.empty() && !hung_up_ && !is_down()) {
         const os::SystemResult sent = os::system_call(
             [&] { return ::send(socket_.get(), rest.data(), rest.size(), MSG_NOSIGNAL | MSG_DONTWAIT); },
             {EAGAIN});
-        if (sent.done()) {
-            rest = rest.subspan(static_cast<std::size_t>(sent.value));
-            continue;
-        }
+        if (sent.done()) rest = rest.subspan(static_cast<std::size_t>(sent.value));
+        hung_up_ = sent.failed();
+        if (!sent.tolerated()) continue;
         pollfd watched{socket_.get(), POLLOUT, 0};
-        const bool writable =
-            sent.tolerated() &&
-            os::system_call([&] { return poll(&watched, 1, milliseconds(kSendPatience_us)); }).value == 1;
-        // A world that has ended owes us nothing any more.
-        if (!writable && ledger_->ended()) return;
-        if (!writable) go_down("the world does not take messages");
+        const os::SystemResult writable =
+            os::system_call([&] { return poll(&watched, 1, milliseconds(kSendPatience_us)); });
+        if (writable.value != 1) go_down("the world does not take messages");
     }
 }
 

@@ -74,6 +74,7 @@ class WorldClient::Connection {
     std::atomic<const char*> fault_{nullptr};
     std::array<std::byte, 64 * sizeof(WorldMessage)> inbox_{};
     std::size_t inbox_bytes_ = 0;
+    bool hung_up_ = false;  // the world takes no more messages
     std::atomic<bool> stopping_{false};
     std::thread reader_;
 };

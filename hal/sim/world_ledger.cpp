@@ -38,6 +38,7 @@ const char* WorldLedger::accept(const WorldMessage& message) {
             return accept_edge(message);
         case WorldMessageKind::kAdvance:
             if (hello_.pace != WorldPace::kLockstep) return "an advance in real time";
+            if (message.time_us < time_us_) return "an advance to a time that has passed";
             return accept_time(message.time_us);
         case WorldMessageKind::kEnd:
             ended_ = true;
@@ -47,21 +48,22 @@ const char* WorldLedger::accept(const WorldMessage& message) {
     }
 }
 
-// Line edges and frames of one moment may come in either order in real time, so only lockstep is strict.
 const char* WorldLedger::accept_time(std::int64_t time_us) {
     if (time_us < 0 || time_us > kLatestTime_us) return "a time out of range";
-    if (hello_.pace == WorldPace::kLockstep && time_us < time_us_) return "a time before the last one";
     time_us_ = std::max(time_us_, time_us);
     return nullptr;
 }
 
 const char* WorldLedger::accept_frame_set(const WorldMessage& message) {
     if (message.slot >= hello_.slot_count) return "a frame in a slot that does not exist";
-    if (holders_[message.slot] != 0) return "a frame in a slot that is still in use";
+    if (ours_[message.slot]) return "a frame in a slot that is still in use";
     if ((message.camera_mask >> hello_.camera_count) != 0) return "a frame of a camera that does not exist";
     const bool lockstep = hello_.pace == WorldPace::kLockstep;
     if (lockstep && tick_outstanding_) return "a frame before the last tick was done";
+    if (message.time_us <= last_frame_us_) return "a frame that is not later than the last one";
     if (const char* fault = accept_time(message.time_us)) return fault;
+    last_frame_us_ = message.time_us;
+    ours_[message.slot] = true;
     tick_outstanding_ = lockstep;
     tick_sequence_ = message.sequence;
     const QueuedFrame frame{message.slot, message.sequence, message.time_us, message.published_us};
@@ -93,7 +95,7 @@ const char* WorldLedger::accept_edge(const WorldMessage& message) {
 
 void WorldLedger::drop_holder(std::size_t camera, std::uint32_t slot) {
     holders_[slot] = static_cast<std::uint8_t>(holders_[slot] & ~(1U << camera));
-    // A slot is freed once and cannot come again before its kSlotFree went out, so the list always has room.
+    // A slot is freed once and cannot come again before the list is taken, so the list always has room.
     if (holders_[slot] == 0) static_cast<void>(freed_.push_back(slot));
 }
 
@@ -117,6 +119,7 @@ bool WorldLedger::release(std::size_t camera, std::uint32_t slot) {
 }
 
 WorldLedger::SlotList WorldLedger::take_freed_slots() {
+    for (const std::uint32_t slot : freed_) ours_[slot] = false;
     return std::exchange(freed_, SlotList{});
 }
 

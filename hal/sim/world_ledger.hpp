@@ -69,7 +69,9 @@ class WorldLedger {
     void drop_holder(std::size_t camera, std::uint32_t slot);
 
     WorldHello hello_;
-    std::int64_t time_us_ = 0;
+    std::int64_t time_us_ =
+        0;  // the latest of all messages; edges may be told after the frame that they precede
+    std::int64_t last_frame_us_ = -1;
     bool ended_ = false;
     bool tick_outstanding_ = false;
     std::uint32_t tick_sequence_ = 0;
@@ -77,6 +79,7 @@ class WorldLedger {
     std::array<bool, kMaxCameras> listening_{};
     std::array<Ring<QueuedFrame, kQueuedFrames>, kMaxCameras> queues_;
     std::array<std::uint8_t, kMaxWorldSlots> holders_{};  // bit c: camera c has the slot queued or borrowed
+    std::array<bool, kMaxWorldSlots> ours_{};  // from its frame set until its kSlotFree is taken out
     SlotList freed_;
     std::array<bool, kWorldLineCount> lines_{};
     std::array<Ring<EdgeEvent, kQueuedEdges>, kWorldLineCount> edges_;

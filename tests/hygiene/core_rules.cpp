@@ -54,7 +54,6 @@ const std::map<std::string_view, std::string_view> kWords{
     {"errno", "errno stops in hal/linux"},
     {"goto", "structured control flow only"},
     {"Dynamic", "Eigen in core is of fixed size"},
-    {"reinterpret_cast", "bytes become values by load() and store() of core/base/bytes.hpp"},
 };
 
 // Wrong after std::.

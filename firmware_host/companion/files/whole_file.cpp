@@ -69,7 +69,18 @@ Result<void, FileError> make_folder(const std::filesystem::path& folder) {
     std::error_code error;
     std::filesystem::create_directories(folder, error);
     if (error) return file_failure(folder, "the folder cannot be made: " + error.message());
+    if (!std::filesystem::is_directory(folder, error))
+        return file_failure(folder, "is a file, expected a folder");
     return {};
+}
+
+Result<void, FileError> make_output_folder(const std::filesystem::path& folder, bool replace) {
+    std::error_code error;
+    if (!replace && std::filesystem::is_directory(folder, error) &&
+        !std::filesystem::is_empty(folder, error)) {
+        return file_failure(folder, "the folder is not empty; add --force to write into it");
+    }
+    return make_folder(folder);
 }
 
 }  // namespace rig::host

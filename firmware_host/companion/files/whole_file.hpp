@@ -25,5 +25,7 @@ inline constexpr std::size_t kMaxWholeFileBytes = std::size_t{1} << 31;
 
 // Makes the folder and its parents; not an error when it is there.
 [[nodiscard]] Result<void, FileError> make_folder(const std::filesystem::path& folder);
+// The same, but a folder that holds anything is an error unless `replace` is true; nothing is ever deleted.
+[[nodiscard]] Result<void, FileError> make_output_folder(const std::filesystem::path& folder, bool replace);
 
 }  // namespace rig::host

@@ -1,4 +1,5 @@
-// The on-disk form of a head: mesh, sparse shapes, names, marker layouts. README.md of this folder is the format.
+// The on-disk form of a head: mesh, sparse shapes, names, marker layouts. README.md of this folder is the
+// format.
 #pragma once
 
 #include <array>
@@ -27,7 +28,7 @@ struct LayoutMarker {
     Int3 vertices{};
     Float3 barycentric{};  // sums to 1
     Float3 neutral_mm{};
-    Float3 normal{};       // outward, unit
+    Float3 normal{};  // outward, unit
 };
 
 struct MarkerLayout {
@@ -50,17 +51,17 @@ struct Take {
     std::vector<float> weights;
 };
 
-// Every loader checks: files there and whole, indices in range, offsets monotonic, numbers finite, counts consistent,
-// names unique. Errors name the file.
+// Every loader checks: files there and whole, indices in range, offsets monotonic, numbers finite, counts
+// consistent, names unique. Errors name the file.
 [[nodiscard]] Result<Rig, FileError> load_rig(const std::filesystem::path& folder);
 [[nodiscard]] Result<void, FileError> save_rig(const std::filesystem::path& folder, const Rig& rig);
 
 // `layout` is a number ("60": markers_60.csv of the folder) or a path to a layout file.
-[[nodiscard]] Result<MarkerLayout, FileError> load_layout(const std::filesystem::path& folder, const std::string& layout,
-                                                          const Rig& rig);
+[[nodiscard]] Result<MarkerLayout, FileError> load_layout(const std::filesystem::path& folder,
+                                                          const std::string& layout, const Rig& rig);
 // markers_<n>.csv, markers_<n>_neutral.npy and markers_<n>_B.npy.
-[[nodiscard]] Result<void, FileError> save_layout(const std::filesystem::path& folder, const MarkerLayout& layout,
-                                                  const Rig& rig);
+[[nodiscard]] Result<void, FileError> save_layout(const std::filesystem::path& folder,
+                                                  const MarkerLayout& layout, const Rig& rig);
 
 // b0 [3m] and B [3m x N] row-major of a layout, computed from mesh and shapes.
 struct MarkerModel {
@@ -69,8 +70,8 @@ struct MarkerModel {
 };
 [[nodiscard]] MarkerModel marker_model(const Rig& rig, const MarkerLayout& layout);
 
-// CSV `frame,time_s,<shape names>`; columns are matched to the rig's shapes by name, any order; every rig shape that
-// the file lacks is 0, a column that the rig lacks is an error.
+// CSV `frame,time_s,<shape names>`; columns are matched to the rig's shapes by name, any order; every rig
+// shape that the file lacks is 0, a column that the rig lacks is an error.
 [[nodiscard]] Result<Take, FileError> load_take(const std::filesystem::path& csv, const Rig& rig);
 [[nodiscard]] Result<void, FileError> save_take(const std::filesystem::path& csv, const Take& take);
 

@@ -66,8 +66,7 @@ class PaintedFace {
     void normals_of(PosedFace& posed) const;
 
     VertexArrays rest_;
-    std::vector<Int3> triangles_;              // skin first: it hides most of the rest
-    std::vector<std::uint8_t> triangle_part_;  // in the order of triangles_
+    std::vector<Int3> triangles_;  // skin first: it hides most of the rest; then by place on the face
     double dot_radius_mm_ = 0.0;
     std::vector<Dot> dots_;
     std::vector<std::uint32_t> dot_offsets_;

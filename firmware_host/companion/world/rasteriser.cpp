@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "firmware_host/companion/world/wide_loops.hpp"
 
 namespace rig::host {
 
@@ -16,56 +20,111 @@ struct Bounds {
     int first_column, end_column, first_row, end_row;
 };
 
-Bounds bounds_of(const PixelRays& rays, const SeenVertices& seen, const std::array<std::size_t, 3>& v) {
-    const auto [left, right] = std::minmax({seen.column[v[0]], seen.column[v[1]], seen.column[v[2]]});
-    const auto [top, bottom] = std::minmax({seen.row[v[0]], seen.row[v[1]], seen.row[v[2]]});
-    // Distortion bends the edges of a large triangle out of the box of its corners.
-    const float bend = 0.02F + 3e-4F * ((right - left) * (right - left) + (bottom - top) * (bottom - top));
-    const auto clamped = [](float value, int limit) {
-        return static_cast<int>(std::clamp(value, 0.0F, static_cast<float>(limit)));
-    };
-    return {clamped(std::ceil(left - bend), rays.width_px), clamped(std::floor(right + bend) + 1.0F, rays.width_px),
-            clamped(std::ceil(top - bend), rays.height_px), clamped(std::floor(bottom + bend) + 1.0F, rays.height_px)};
+// Everything that rasterise() calls per triangle is inlined by force, to be part of both copies of it.
+#define RIG_INLINE [[gnu::always_inline]] inline
+
+RIG_INLINE float least(float a, float b, float c) {
+    const float ab = a < b ? a : b;
+    return ab < c ? ab : c;
 }
 
-void draw(const PixelRays& rays, const TrianglePlane& plane, std::uint32_t index, const Bounds& box,
-          SeenSurface& surface) {
+RIG_INLINE float most(float a, float b, float c) {
+    const float ab = a > b ? a : b;
+    return ab > c ? ab : c;
+}
+
+// Conversion to int cuts the fraction off; what that rounds outwards by too much costs a pixel's test and no more.
+RIG_INLINE int clamped(float value, int limit) {
+    const auto end = static_cast<float>(limit);
+    const float low = value > 0.0F ? value : 0.0F;
+    return static_cast<int>(low < end ? low : end);
+}
+
+RIG_INLINE Bounds bounds_of(int width_px, int height_px, const SeenVertices& seen, const std::array<std::size_t, 3>& v) {
+    const float* column = seen.column.data();
+    const float* row = seen.row.data();
+    const float left = least(column[v[0]], column[v[1]], column[v[2]]);
+    const float right = most(column[v[0]], column[v[1]], column[v[2]]);
+    const float top = least(row[v[0]], row[v[1]], row[v[2]]);
+    const float bottom = most(row[v[0]], row[v[1]], row[v[2]]);
+    // Distortion bends the edges of a large triangle out of the box of its corners.
+    const float bend = 0.02F + 3e-4F * ((right - left) * (right - left) + (bottom - top) * (bottom - top));
+    return {clamped(left - bend + 0.999F, width_px), clamped(right + bend + 1.0F, width_px),
+            clamped(top - bend + 0.999F, height_px), clamped(bottom + bend + 1.0F, height_px)};
+}
+
+// Four pixels at once, as a vector that every compiler of this project lays out alike.
+using Floats = float __attribute__((vector_size(16)));
+using Masks = std::int32_t __attribute__((vector_size(16)));
+
+RIG_INLINE Floats floats(const std::array<float, kWide>& from) {
+    Floats v;
+    std::memcpy(&v, from.data(), sizeof(v));
+    return v;
+}
+
+RIG_INLINE bool any(Masks mask) {
+    std::array<std::uint64_t, 2> halves{};
+    std::memcpy(halves.data(), &mask, sizeof(mask));
+    return (halves[0] | halves[1]) != 0;
+}
+
+// Each pixel is tested with its own ray, so pixels of a group that lie beyond the box do no harm.
+RIG_INLINE void draw(const TrianglePlane& plane, std::uint32_t index, const Bounds& box, PixelGrid& grid) {
+    const Masks mine = Masks{} + static_cast<std::int32_t>(index);
+    const int first = box.first_column / kWide;
+    const int end = (box.end_column + kWide - 1) / kWide;
     for (int row = box.first_row; row < box.end_row; ++row) {
-        const std::size_t line = static_cast<std::size_t>(row) * static_cast<std::size_t>(rays.width_px);
-        const float* rx = rays.x.data() + line;
-        const float* ry = rays.y.data() + line;
-        float* depth = surface.inverse_depth.data() + line;
-        std::uint32_t* owner = surface.plane.data() + line;
-        for (int column = box.first_column; column < box.end_column; ++column) {
-            const float dx = rx[column] - plane.ax;
-            const float dy = ry[column] - plane.ay;
-            const float b = plane.bx * dx + plane.by * dy;
-            const float c = plane.cx * dx + plane.cy * dy;
-            const float nearness = plane.iz + plane.iz_b * b + plane.iz_c * c;
-            const bool inside = (b >= kEdgeSlack) & (c >= kEdgeSlack) & (b + c <= 1.0F - kEdgeSlack);
-            const bool wins = inside & (nearness > depth[column]);
-            depth[column] = wins ? nearness : depth[column];
-            owner[column] = wins ? index : owner[column];
+        PixelGroup* groups = grid.row(row);
+        for (int g = first; g < end; ++g) {
+            PixelGroup& group = groups[g];
+            const Floats dx = floats(group.x) - plane.ax;
+            const Floats dy = floats(group.y) - plane.ay;
+            const Floats b = plane.bx * dx + plane.by * dy;
+            const Floats c = plane.cx * dx + plane.cy * dy;
+            const Floats nearness = plane.iz + plane.iz_b * b + plane.iz_c * c;
+            const Floats old = floats(group.inverse_depth);
+            const Masks wins = (b >= kEdgeSlack) & (c >= kEdgeSlack) & (b + c <= 1.0F - kEdgeSlack) & (nearness > old);
+            if (!any(wins)) continue;
+            Masks owner;
+            std::memcpy(&owner, group.plane.data(), sizeof(owner));
+            const Floats depth = wins ? nearness : old;
+            owner = wins ? mine : owner;
+            std::memcpy(group.inverse_depth.data(), &depth, sizeof(depth));
+            std::memcpy(group.plane.data(), &owner, sizeof(owner));
         }
     }
 }
 
 }  // namespace
 
-PixelRays::PixelRays(const HelmetCamera& camera) : width_px(camera.width_px), height_px(camera.height_px) {
-    const std::size_t count = static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
-    x.reserve(count);
-    y.reserve(count);
-    for (int row = 0; row < height_px; ++row) {
-        for (int column = 0; column < width_px; ++column) {
-            const RaySlope slope = slope_of_pixel(camera, column, row);
-            x.push_back(static_cast<float>(camera.f_px * slope.x));
-            y.push_back(static_cast<float>(camera.f_px * slope.y));
+PixelGrid::PixelGrid(const HelmetCamera& camera)
+    : width_px_(camera.width_px),
+      height_px_(camera.height_px),
+      stride_(static_cast<std::size_t>((camera.width_px + kWide - 1) / kWide)),
+      groups_(stride_ * static_cast<std::size_t>(camera.height_px)) {
+    constexpr float kNowhere = std::numeric_limits<float>::quiet_NaN();
+    for (int y = 0; y < height_px_; ++y) {
+        for (int x = 0; x < static_cast<int>(stride_) * kWide; ++x) {
+            const RaySlope slope = slope_of_pixel(camera, x, y);
+            PixelGroup& group = row(y)[x / kWide];
+            const auto lane = static_cast<std::size_t>(x % kWide);
+            const bool inside = x < width_px_;
+            group.x[lane] = inside ? static_cast<float>(camera.f_px * slope.x) : kNowhere;
+            group.y[lane] = inside ? static_cast<float>(camera.f_px * slope.y) : kNowhere;
         }
+    }
+    clear();
+}
+
+void PixelGrid::clear() {
+    for (PixelGroup& group : groups_) {
+        group.inverse_depth.fill(0.0F);
+        group.plane.fill(kNothing);
     }
 }
 
-void project(const HelmetCamera& camera, const FaceView& view, const VertexArrays& position_mm, SeenVertices& seen) {
+RIG_WIDE_LOOPS void project(const HelmetCamera& camera, const FaceView& view, const VertexArrays& position_mm, SeenVertices& seen) {
     const std::size_t count = position_mm.x.size();
     for (auto* array : {&seen.x, &seen.y, &seen.inverse_depth, &seen.column, &seen.row, &seen.light}) {
         array->resize(count);
@@ -105,15 +164,12 @@ void project(const HelmetCamera& camera, const FaceView& view, const VertexArray
     }
 }
 
-void rasterise(const PixelRays& rays, std::span<const Int3> triangles, const SeenVertices& seen,
-               SeenSurface& surface) {
-    const std::size_t pixels = rays.x.size();
-    surface.inverse_depth.assign(pixels, 0.0F);
-    surface.plane.assign(pixels, kNothing);
+RIG_WIDE_LOOPS void rasterise(std::span<const Int3> triangles, const SeenVertices& seen, PixelGrid& grid, SeenSurface& surface) {
+    grid.clear();
     surface.planes.clear();
     surface.triangle.clear();
-    surface.first_column = rays.width_px;
-    surface.first_row = rays.height_px;
+    surface.first_column = grid.width_px();
+    surface.first_row = grid.height_px();
     surface.end_column = 0;
     surface.end_row = 0;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
@@ -127,14 +183,14 @@ void rasterise(const PixelRays& rays, std::span<const Int3> triangles, const See
         if (!(area < -kSmallestArea_px2)) continue;
         const float ia = seen.inverse_depth[v[0]], ib = seen.inverse_depth[v[1]], ic = seen.inverse_depth[v[2]];
         if (ia <= 0.0F || ib <= 0.0F || ic <= 0.0F) continue;
-        const Bounds box = bounds_of(rays, seen, v);
+        const Bounds box = bounds_of(grid.width_px(), grid.height_px(), seen, v);
         if (box.first_column >= box.end_column || box.first_row >= box.end_row) continue;
         const float scale = 1.0F / area;
         const float light = seen.light[v[0]];
         const TrianglePlane plane{seen.x[v[0]], seen.y[v[0]], wy * scale, -wx * scale, -uy * scale, ux * scale, ia,
                                   ib - ia,      ic - ia,      light,      seen.light[v[1]] - light,
                                   seen.light[v[2]] - light};
-        draw(rays, plane, static_cast<std::uint32_t>(surface.planes.size()), box, surface);
+        draw(plane, static_cast<std::uint32_t>(surface.planes.size()), box, grid);
         surface.planes.push_back(plane);
         surface.triangle.push_back(static_cast<std::uint32_t>(t));
         surface.first_column = std::min(surface.first_column, box.first_column);

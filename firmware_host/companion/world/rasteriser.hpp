@@ -12,13 +12,46 @@
 
 namespace rig::host {
 
-// Undistorted image plane, in pixels from the optical axis ("ideal px": f X / Z, f Y / Z), for every pixel. NaN where
-// the lens formula does not reach: such a pixel sees nothing.
-struct PixelRays {
-    explicit PixelRays(const HelmetCamera& camera);
-    int width_px;
-    int height_px;
-    std::vector<float> x, y;
+inline constexpr std::uint32_t kNothing = 0xFFFFFFFFU;
+inline constexpr int kWide = 4;
+
+// Four pixels of a row, in one cache line. x, y: the pixel's ray on the undistorted image plane, in pixels from the
+// optical axis ("ideal px": f X / Z, f Y / Z); NaN where the lens formula does not reach, which sees nothing.
+struct alignas(64) PixelGroup {
+    std::array<float, kWide> x, y;
+    std::array<float, kWide> inverse_depth;      // 1/mm, 0 where nothing is
+    std::array<std::uint32_t, kWide> plane;      // index into SeenSurface::planes, or kNothing
+};
+static_assert(sizeof(PixelGroup) == 64);
+
+struct IdealPoint {
+    float x, y;
+};
+
+// Every pixel of one camera.
+class PixelGrid {
+  public:
+    explicit PixelGrid(const HelmetCamera& camera);
+    void clear();
+    [[nodiscard]] int width_px() const { return width_px_; }
+    [[nodiscard]] int height_px() const { return height_px_; }
+    // Groups of a row; the last may reach beyond the image, where rays are NaN.
+    [[nodiscard]] PixelGroup* row(int y) { return groups_.data() + static_cast<std::size_t>(y) * stride_; }
+    [[nodiscard]] const PixelGroup* row(int y) const { return groups_.data() + static_cast<std::size_t>(y) * stride_; }
+    [[nodiscard]] IdealPoint ray(int x, int y) const {
+        const PixelGroup& group = row(y)[x / kWide];
+        const auto lane = static_cast<std::size_t>(x % kWide);
+        return {group.x[lane], group.y[lane]};
+    }
+    [[nodiscard]] std::uint32_t plane(int x, int y) const {
+        return row(y)[x / kWide].plane[static_cast<std::size_t>(x % kWide)];
+    }
+
+  private:
+    int width_px_;
+    int height_px_;
+    std::size_t stride_;
+    std::vector<PixelGroup> groups_;
 };
 
 // X_cam = rotation X_face + offset_mm: slip and camera in one.
@@ -46,17 +79,12 @@ struct TrianglePlane {
     float light, light_b, light_c;
 };
 
-inline constexpr std::uint32_t kNothing = 0xFFFFFFFFU;
-
 struct SeenSurface {
-    std::vector<float> inverse_depth;     // per pixel, 0 where nothing is
-    std::vector<std::uint32_t> plane;     // per pixel, index into planes or kNothing
     std::vector<TrianglePlane> planes;    // front-facing triangles that reach the image
     std::vector<std::uint32_t> triangle;  // of each plane
     int first_column = 0, end_column = 0, first_row = 0, end_row = 0;  // bounds of everything drawn
 };
 
-void rasterise(const PixelRays& rays, std::span<const Int3> triangles, const SeenVertices& seen,
-               SeenSurface& surface);
+void rasterise(std::span<const Int3> triangles, const SeenVertices& seen, PixelGrid& grid, SeenSurface& surface);
 
 }  // namespace rig::host

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "firmware_host/companion/world/vector.hpp"
+#include "firmware_host/companion/world/wide_loops.hpp"
 
 namespace rig::host {
 
@@ -42,6 +43,33 @@ void fill_normal(std::uint64_t seed, std::span<const float> quantiles, std::span
         }
         const std::size_t here = std::min(kLanes, row.size() - x);
         for (std::size_t lane = 0; lane < here; ++lane) row[x + lane] = quantiles[state[lane] >> (32 - kQuantileBits)];
+    }
+}
+
+// out[x] = k0 in[x] + sum over k of taps[k] (in[x - k step] + in[x + k step])
+RIG_WIDE_LOOPS void convolve(const float* in, std::size_t step, std::span<const float> taps, std::size_t count, float* __restrict__ out) {
+    for (std::size_t x = 0; x < count; ++x) out[x] = taps[0] * in[x];
+    for (std::size_t k = 1; k < taps.size(); ++k) {
+        const float tap = taps[k];
+        const float* before = in - k * step;
+        const float* after = in + k * step;
+        for (std::size_t x = 0; x < count; ++x) out[x] += tap * (before[x] + after[x]);
+    }
+}
+
+struct Amplifier {
+    float scale;  // exposure times gain
+    float shot;   // variance per DN of signal
+    float read;   // variance
+};
+
+RIG_WIDE_LOOPS void digitise(const Amplifier& amplifier, const float* light, const float* shade, const float* normal, std::size_t count,
+                             std::uint8_t* __restrict__ out) {
+    for (std::size_t x = 0; x < count; ++x) {
+        const float signal = light[x] * shade[x] * amplifier.scale;
+        const float value = kBlackLevel_dn + 0.5F + signal + std::sqrt(amplifier.shot * signal + amplifier.read) * normal[x];
+        const float low = value > 0.0F ? value : 0.0F;
+        out[x] = static_cast<std::uint8_t>(static_cast<int>(low < 255.0F ? low : 255.0F));
     }
 }
 
@@ -86,26 +114,10 @@ void Sensor::blur(Radiance& light) {
     if (left >= right || top >= bottom) return;
     const std::size_t span = right - left;
     for (std::size_t y = top - reach; y < bottom + reach; ++y) {
-        const float* in = light.values.data() + y * width_ + left;
-        float* __restrict__ out = scratch_.data() + y * width_ + left;
-        for (std::size_t x = 0; x < span; ++x) out[x] = taps_[0] * in[x];
-        for (std::size_t k = 1; k <= reach; ++k) {
-            const float tap = taps_[k];
-            const float* before = in - k;
-            const float* after = in + k;
-            for (std::size_t x = 0; x < span; ++x) out[x] += tap * (before[x] + after[x]);
-        }
+        convolve(light.values.data() + y * width_ + left, 1, taps_, span, scratch_.data() + y * width_ + left);
     }
     for (std::size_t y = top; y < bottom; ++y) {
-        const float* in = scratch_.data() + y * width_ + left;
-        float* __restrict__ out = light.values.data() + y * width_ + left;
-        for (std::size_t x = 0; x < span; ++x) out[x] = taps_[0] * in[x];
-        for (std::size_t k = 1; k <= reach; ++k) {
-            const float tap = taps_[k];
-            const float* above = in - k * width_;
-            const float* below = in + k * width_;
-            for (std::size_t x = 0; x < span; ++x) out[x] += tap * (above[x] + below[x]);
-        }
+        convolve(scratch_.data() + y * width_ + left, width_, taps_, span, light.values.data() + y * width_ + left);
     }
 }
 
@@ -119,16 +131,9 @@ void Sensor::expose(Radiance& light, const CameraControl& control, std::uint64_t
     const std::uint64_t stream = mix_bits(mix_bits(seed + 11) + 4096 * frame + camera);
     for (std::size_t y = 0; y < height_; ++y) {
         fill_normal(mix_bits(stream + y), quantiles_, noise_row_);
-        const float* in = light.values.data() + y * width_;
-        const float* shade = vignetting_.data() + y * width_;
-        const float* normal = noise_row_.data();
-        std::uint8_t* out = image.data() + y * width_;
-        for (std::size_t x = 0; x < width_; ++x) {
-            const float signal = in[x] * shade[x] * exposure * gain;
-            const float value = kBlackLevel_dn + 0.5F + signal + std::sqrt(shot * signal + read) * normal[x];
-            const float low = value > 0.0F ? value : 0.0F;
-            out[x] = static_cast<std::uint8_t>(static_cast<int>(low < 255.0F ? low : 255.0F));
-        }
+        const Amplifier amplifier{exposure * gain, shot, read};
+        digitise(amplifier, light.values.data() + y * width_, vignetting_.data() + y * width_, noise_row_.data(), width_,
+                 image.data() + y * width_);
     }
 }
 

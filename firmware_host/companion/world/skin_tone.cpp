@@ -154,8 +154,8 @@ class DepthMap {
   public:
     DepthMap(const Vec3d& towards_viewer, std::span<const Float3> vertices, std::span<const Int3> triangles)
         : w_(towards_viewer) {
-        const Vec3d helper = std::abs(w_[1]) < 0.9 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0};
-        u_ = normalised(cross(helper, w_));
+        const Vec3d aside = std::abs(w_[1]) < 0.9 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0};
+        u_ = normalised(cross(aside, w_));
         v_ = cross(w_, u_);
         low_ = {1e9, 1e9, 1e9};
         Vec3d high{-1e9, -1e9, -1e9};

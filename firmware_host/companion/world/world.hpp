@@ -106,14 +106,15 @@ class WorldRenderer {
 
     void pose(std::size_t frame);
     void prepare_dots();
-    void shade(const PixelRays& rays);
-    [[nodiscard]] float paint(const PixelRays& rays, std::size_t pixel, const TrianglePlane& plane, std::uint32_t triangle, float skin_dn);
+    void shade(const PixelGrid& grid);
+    // Radiance of a pixel whose triangle may carry dots; adds the pixel to those dots' sums.
+    [[nodiscard]] float paint(const PixelGrid& grid, int column, int row, std::uint32_t index, float skin_dn);
     void report(std::size_t camera, std::span<MarkerSight> sights) const;
-    [[nodiscard]] bool unhidden(std::size_t marker, const PixelAt& at, const HelmetCamera& camera) const;
+    [[nodiscard]] bool unhidden(std::size_t marker, const PixelAt& at, std::size_t camera) const;
 
     const World& world_;
     Lighting lighting_;
-    std::vector<PixelRays> rays_;
+    std::vector<PixelGrid> grids_;
     std::vector<Sensor> sensors_;
     PosedFace posed_;
     std::size_t posed_frame_;
@@ -124,8 +125,6 @@ class WorldRenderer {
     Radiance radiance_;
     std::vector<DotSum> dots_;
     std::vector<double> cos_view_;
-    int width_px_ = 0;
-    int height_px_ = 0;
 };
 
 }  // namespace rig::host

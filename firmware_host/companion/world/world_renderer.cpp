@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "firmware_host/companion/world/world.hpp"
 
@@ -12,6 +13,7 @@ constexpr float kInk = 0.13F;             // of the light that bare skin there w
 constexpr float kRetro_dn = 205.0F;       // of a reflector that faces the camera from 200 mm
 constexpr double kRetroReference_mm = 200.0;
 constexpr double kHiddenBy_mm = 0.6;      // a surface this far in front of a marker hides it
+constexpr float kRimBand_mm = 1.5F;       // farther from a rim than this, a pixel is all paint or all skin
 constexpr std::size_t kNoFrame = std::numeric_limits<std::size_t>::max();
 
 struct Rest {
@@ -33,11 +35,38 @@ Rest rest_at(const PaintedFace& face, const Int3& corner, const TrianglePlane& p
     return {mix(rest.x), mix(rest.y), mix(rest.z)};
 }
 
-float distance_mm(const Rest& p, const Dot& dot) {
-    const float dx = p.x - static_cast<float>(dot.rest_mm[0]);
-    const float dy = p.y - static_cast<float>(dot.rest_mm[1]);
-    const float dz = p.z - static_cast<float>(dot.rest_mm[2]);
-    return std::sqrt(dx * dx + dy * dy + dz * dz);
+Rest operator-(const Rest& a, const Rest& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+float dot(const Rest& a, const Rest& b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+float length(const Rest& a) {
+    return std::sqrt(dot(a, a));
+}
+
+Rest centre_of(const Dot& painted) {
+    return {static_cast<float>(painted.rest_mm[0]), static_cast<float>(painted.rest_mm[1]), static_cast<float>(painted.rest_mm[2])};
+}
+
+// How far the point of the neutral face moves from one pixel to the next, in either direction of the image.
+struct RestPerPixel {
+    Rest x, y;
+};
+
+RestPerPixel change_at(const PaintedFace& face, const Int3& corner, const TrianglePlane& plane, const PixelGrid& grid,
+                       int column, int row) {
+    const IdealPoint here = grid.ray(column, row);
+    const auto across = [&](const IdealPoint& neighbour) {
+        const float dx = 0.5F * (neighbour.x - here.x), dy = 0.5F * (neighbour.y - here.y);
+        return rest_at(face, corner, plane, here.x + dx, here.y + dy) - rest_at(face, corner, plane, here.x - dx, here.y - dy);
+    };
+    // Towards the middle of the image, so that the neighbour exists; the sign of a change does not matter.
+    const int beside = column + 1 < grid.width_px() ? column + 1 : column - 1;
+    const int below = row + 1 < grid.height_px() ? row + 1 : row - 1;
+    return {across(grid.ray(beside, row)), across(grid.ray(column, below))};
 }
 
 // Sheeting sends light back up to about 60 degrees of entrance, and fades smoothly beyond.
@@ -53,11 +82,9 @@ WorldRenderer::WorldRenderer(const World& world)
       lighting_(lighting_for(world.config().style, world.cameras())),
       posed_frame_(kNoFrame),
       dots_(world.marker_count()),
-      cos_view_(world.marker_count()),
-      width_px_(world.cameras()[0].width_px),
-      height_px_(world.cameras()[0].height_px) {
+      cos_view_(world.marker_count()) {
     for (const HelmetCamera& camera : world.cameras()) {
-        rays_.emplace_back(camera);
+        grids_.emplace_back(camera);
         sensors_.emplace_back(camera, world.config().defocus_px, world.config().vignetting, world.config().noise);
     }
     radiance_.values.resize(world.image_bytes());
@@ -78,9 +105,9 @@ void WorldRenderer::render(std::size_t frame, std::size_t camera, const CameraCo
     view_ = world_.view(frame, camera);
     project(eye, view_, posed_.position_mm, seen_);
     light_vertices(lighting_, eye, view_, world_.face(), posed_, seen_);
-    rasterise(rays_[camera], world_.face().triangles(), seen_, surface_);
+    rasterise(world_.face().triangles(), seen_, grids_[camera], surface_);
     prepare_dots();
-    shade(rays_[camera]);
+    shade(grids_[camera]);
     sensors_[camera].expose(radiance_, control, world_.config().seed, frame, camera, image);
     if (!sights.empty()) report(camera, sights);
 }
@@ -104,7 +131,7 @@ void WorldRenderer::prepare_dots() {
     }
 }
 
-void WorldRenderer::shade(const PixelRays& rays) {
+void WorldRenderer::shade(const PixelGrid& grid) {
     std::fill(radiance_.values.begin(), radiance_.values.end(), radiance_.background);
     radiance_.first_column = surface_.first_column;
     radiance_.end_column = surface_.end_column;
@@ -112,75 +139,66 @@ void WorldRenderer::shade(const PixelRays& rays) {
     radiance_.end_row = surface_.end_row;
     const PaintedFace& face = world_.face();
     for (int row = surface_.first_row; row < surface_.end_row; ++row) {
-        const std::size_t line = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_px_);
+        float* out = radiance_.values.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width_px());
         for (int column = surface_.first_column; column < surface_.end_column; ++column) {
-            const std::size_t pixel = line + static_cast<std::size_t>(column);
-            const std::uint32_t index = surface_.plane[pixel];
+            const std::uint32_t index = grid.plane(column, row);
             if (index == kNothing) continue;
             const TrianglePlane& plane = surface_.planes[index];
-            const float dx = rays.x[pixel] - plane.ax, dy = rays.y[pixel] - plane.ay;
+            const IdealPoint ray = grid.ray(column, row);
+            const float dx = ray.x - plane.ax, dy = ray.y - plane.ay;
             const float skin_dn = plane.light + plane.light_b * (plane.bx * dx + plane.by * dy) +
                                   plane.light_c * (plane.cx * dx + plane.cy * dy);
             const std::uint32_t triangle = surface_.triangle[index];
-            radiance_.values[pixel] = face.dots_of(triangle).empty() ? skin_dn : paint(rays, pixel, plane, triangle, skin_dn);
+            out[column] = face.dots_of(triangle).empty() ? skin_dn : paint(grid, column, row, index, skin_dn);
         }
     }
 }
 
 // Coverage of the pixel by paint: distance to the dot's rim, measured on the neutral skin, over its change per pixel.
-float WorldRenderer::paint(const PixelRays& rays, std::size_t pixel, const TrianglePlane& plane, std::uint32_t triangle, float skin_dn) {
+float WorldRenderer::paint(const PixelGrid& grid, int column, int row, std::uint32_t index, float skin_dn) {
     const PaintedFace& face = world_.face();
+    const TrianglePlane& plane = surface_.planes[index];
+    const std::uint32_t triangle = surface_.triangle[index];
+    const IdealPoint ray = grid.ray(column, row);
     const Int3& corner = face.triangles()[triangle];
-    const auto width = static_cast<std::size_t>(width_px_);
-    const std::size_t column = pixel % width, row = pixel / width;
-    const std::vector<float>& rx = rays.x;
-    const std::vector<float>& ry = rays.y;
-    // Steps towards the middle of the image, so that the neighbour exists.
-    const bool right = column + 1 < width, down = row + 1 < static_cast<std::size_t>(height_px_);
-    const std::size_t beside = right ? pixel + 1 : pixel - 1;
-    const std::size_t below = down ? pixel + width : pixel - width;
-    const float sx = right ? 0.5F : -0.5F, sy = down ? 0.5F : -0.5F;
-    const float hx = sx * (rx[beside] - rx[pixel]), hy = sx * (ry[beside] - ry[pixel]);
-    const float vx = sy * (rx[below] - rx[pixel]), vy = sy * (ry[below] - ry[pixel]);
-    const Rest here = rest_at(face, corner, plane, rx[pixel], ry[pixel]);
+    const auto radius = static_cast<float>(face.dot_radius_mm());
+    const Rest here = rest_at(face, corner, plane, ray.x, ray.y);
+    std::optional<RestPerPixel> change;
     float value = skin_dn;
     for (const std::uint16_t m : face.dots_of(triangle)) {
-        const Dot& dot_here = face.dots()[m];
-        const float d = distance_mm(here, dot_here);
-        const auto radius = static_cast<float>(face.dot_radius_mm());
-        if (d > 2.0F * radius + 2.0F) continue;
-        const auto sample = [&](float dx, float dy) {
-            return distance_mm(rest_at(face, corner, plane, rx[pixel] + dx, ry[pixel] + dy), dot_here);
-        };
-        const float gx = sample(hx, hy) - sample(-hx, -hy);
-        const float gy = sample(vx, vy) - sample(-vx, -vy);
-        const float per_px = std::sqrt(gx * gx + gy * gy) + 1e-6F;
-        // Around the centre the distance has no gradient, and the pixel is inside anyway.
-        const float cover = d < 0.3F * radius ? 1.0F : std::clamp(0.5F + (radius - d) / per_px, 0.0F, 1.0F);
+        const Rest from = here - centre_of(face.dots()[m]);
+        const float d = length(from);
+        if (d > radius + kRimBand_mm) continue;
+        float cover = 1.0F;
+        if (d > radius - kRimBand_mm && d > 0.3F * radius) {
+            if (!change) change = change_at(face, corner, plane, grid, column, row);
+            const float gx = dot(from, change->x), gy = dot(from, change->y);
+            cover = std::clamp(0.5F + (radius - d) * d / (std::sqrt(gx * gx + gy * gy) + 1e-6F), 0.0F, 1.0F);
+        }
         if (cover <= 0.0F) continue;
-        const float paint_dn = world_.config().style == DotStyle::kInk ? kInk * skin_dn : 0.5F * skin_dn + dots_[m].retro_dn;
+        const bool ink = world_.config().style == DotStyle::kInk;
+        const float paint_dn = ink ? kInk * skin_dn : 0.5F * skin_dn + dots_[m].retro_dn;
         value += cover * (paint_dn - value);
-        dots_[m].area += static_cast<double>(cover);
-        dots_[m].x += static_cast<double>(cover) * static_cast<double>(column);
-        dots_[m].y += static_cast<double>(cover) * static_cast<double>(row);
+        const auto share = static_cast<double>(cover);
+        dots_[m].area += share;
+        dots_[m].x += share * column;
+        dots_[m].y += share * row;
     }
     return value;
 }
 
-bool WorldRenderer::unhidden(std::size_t marker, const PixelAt& at, const HelmetCamera& camera) const {
-    const auto column = static_cast<int>(std::lround(at.x_px));
-    const auto row = static_cast<int>(std::lround(at.y_px));
-    if (column < 0 || row < 0 || column >= width_px_ || row >= height_px_) return false;
-    const std::size_t pixel =
-        static_cast<std::size_t>(row) * static_cast<std::size_t>(width_px_) + static_cast<std::size_t>(column);
-    const std::uint32_t index = surface_.plane[pixel];
+bool WorldRenderer::unhidden(std::size_t marker, const PixelAt& at, std::size_t camera) const {
+    const HelmetCamera& eye = world_.cameras()[camera];
+    if (!(at.x_px > -0.5 && at.y_px > -0.5 && at.x_px < eye.width_px - 0.5 && at.y_px < eye.height_px - 0.5)) return false;
+    const std::uint32_t index =
+        grids_[camera].plane(static_cast<int>(std::lround(at.x_px)), static_cast<int>(std::lround(at.y_px)));
     if (index == kNothing) return false;
     const auto listed = world_.face().dots_of(surface_.triangle[index]);
     if (std::find(listed.begin(), listed.end(), marker) != listed.end()) return true;
     const TrianglePlane& plane = surface_.planes[index];
-    const RaySlope slope = slope_of_pixel(camera, at.x_px, at.y_px);
-    const double dx = camera.f_px * slope.x - static_cast<double>(plane.ax);
-    const double dy = camera.f_px * slope.y - static_cast<double>(plane.ay);
+    const RaySlope slope = slope_of_pixel(eye, at.x_px, at.y_px);
+    const double dx = eye.f_px * slope.x - static_cast<double>(plane.ax);
+    const double dy = eye.f_px * slope.y - static_cast<double>(plane.ay);
     const double inverse = static_cast<double>(plane.iz) +
                            static_cast<double>(plane.iz_b) * (static_cast<double>(plane.bx) * dx + static_cast<double>(plane.by) * dy) +
                            static_cast<double>(plane.iz_c) * (static_cast<double>(plane.cx) * dx + static_cast<double>(plane.cy) * dy);
@@ -199,7 +217,7 @@ void WorldRenderer::report(std::size_t camera, std::span<MarkerSight> sights) co
         sight.dot_x_px = scale * dots_[m].x;
         sight.dot_y_px = scale * dots_[m].y;
         sight.cos_view = cos_view_[m];
-        sight.visible = at.depth_mm > 0.0 && cos_view_[m] > 0.0 && dots_[m].area > 0.0 && unhidden(m, at, eye);
+        sight.visible = at.depth_mm > 0.0 && cos_view_[m] > 0.0 && dots_[m].area > 0.0 && unhidden(m, at, camera);
     }
 }
 

@@ -1,0 +1,201 @@
+// headrig train: a pack for a head, a marker layout and a solver.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "firmware_host/companion/commands/console.hpp"
+#include "firmware_host/companion/commands/verbs.hpp"
+#include "firmware_host/companion/train/camera_file.hpp"
+#include "firmware_host/companion/train/pack_writer.hpp"
+#include "firmware_host/companion/train/train.hpp"
+
+namespace rig::host {
+
+namespace {
+
+struct TrainCommand {
+    std::string rig;
+    std::string layout = "60";
+    std::string out;
+    std::string cameras;
+    std::string temporal = "auto";
+    std::string name;
+    std::vector<std::string> takes;
+    TrainOptions options;
+    PackIdentity identity;
+};
+
+// False when the text is neither auto, on, off nor a number.
+bool read_temporal(const std::string& text, TemporalPull& temporal) {
+    const std::map<std::string, TemporalPull::Mode> modes = {{"auto", TemporalPull::Mode::kSolversOwn},
+                                                             {"on", TemporalPull::Mode::kOn},
+                                                             {"off", TemporalPull::Mode::kOff}};
+    if (const auto found = modes.find(text); found != modes.end()) {
+        temporal.mode = found->second;
+        return true;
+    }
+    double step = 0.0;
+    if (!CLI::detail::lexical_cast(text, step)) return false;
+    temporal = {TemporalPull::Mode::kOn, step};
+    return true;
+}
+
+void print_result(const TrainCommand& command, const TrainedPack& pack) {
+    fmt::print("{}: {} markers, {} shapes, {} cameras, {} bytes\n", command.out, pack.marker_names.size(),
+               pack.shape_names.size(), pack.cameras.size(), std::filesystem::file_size(command.out));
+    fmt::print("basis: rank {} of {}, condition {:.0f}\n", pack.report.rank, pack.shape_names.size(),
+               pack.report.condition);
+    fmt::print("noise {:.4g} mm, sparsity {:.4g} mm^2, ridge {:.4g} mm^2\n", pack.noise_mm, pack.sparsity_mm2,
+               pack.ridge_mm2);
+    if (!pack.report.rbf) return;
+    const RbfTrainingReport& rbf = *pack.report.rbf;
+    fmt::print(
+        "rbf: {} frames, {} references, {} dimensions ({:.2f} % of the variance), width {} x spacing, lambda "
+        "{:.2g}\n",
+        rbf.frames, rbf.centres, rbf.dimensions, 100.0 * rbf.variance_kept, rbf.width_factor,
+        rbf.median_lambda);
+    fmt::print("rbf weight rms: {:.4f} in the take ({:.4f} over visible shapes), {:.4f} on blocks left out\n",
+               rbf.in_take_rms, rbf.visible_in_take_rms, rbf.cross_validated_rms);
+}
+
+void print_warnings(const TrainedPack& pack) {
+    const std::size_t shapes = pack.shape_names.size();
+    if (pack.report.rank < shapes) {
+        print_error(fmt::format(
+            "warning: the layout tells only {} of {} shapes apart (rank of B); a layout with more "
+            "markers tells more",
+            pack.report.rank, shapes));
+    }
+    if (pack.report.invisible.empty()) return;
+    std::string list;
+    for (const InvisibleShape& shape : pack.report.invisible) {
+        list += fmt::format("{}{} {:.2f} mm", list.empty() ? "" : ", ", shape.name, shape.column_mm);
+    }
+    print_error(fmt::format(
+        "warning: {} shapes hardly move any marker of this layout (less than {} mm in sum), their "
+        "weights will be guesses: {}",
+        pack.report.invisible.size(), kInvisibleMm, list));
+}
+
+// Loads what the options name; the message of the first file that is wrong, or nothing.
+Result<void, FileError> load_inputs(TrainCommand& command, Rig& rig, MarkerLayout& layout) {
+    auto loaded_rig = load_rig(command.rig);
+    if (!loaded_rig) return failure(loaded_rig.error());
+    rig = std::move(*loaded_rig);
+    auto loaded_layout = load_layout(command.rig, command.layout, rig);
+    if (!loaded_layout) return failure(loaded_layout.error());
+    layout = std::move(*loaded_layout);
+    for (const std::string& path : command.takes) {
+        auto take = load_take(path, rig);
+        if (!take) return failure(take.error());
+        command.options.takes.push_back(std::move(*take));
+    }
+    if (!command.cameras.empty()) {
+        auto cameras = load_cameras(command.cameras);
+        if (!cameras) return failure(cameras.error());
+        command.options.cameras = std::move(*cameras);
+    }
+    return {};
+}
+
+int run_train(TrainCommand& command) {
+    if (!read_temporal(command.temporal, command.options.temporal)) {
+        print_error(
+            fmt::format("--temporal {}: give auto, on, off or the step a weight takes in a frame, e.g. 0.03",
+                        command.temporal));
+        return kExitUsage;
+    }
+    if (const std::string fault = fault_of_options(command.options, command.takes.size()); !fault.empty()) {
+        print_error(fault);
+        return kExitUsage;
+    }
+    Rig rig;
+    MarkerLayout layout;
+    if (const auto loaded = load_inputs(command, rig, layout); !loaded) {
+        print_error(loaded.error().message);
+        return kExitInput;
+    }
+    Progress bar("train", 1000);
+    const auto pack = train(rig, layout, command.options, [&](double share) {
+        bar.update(static_cast<std::uint64_t>(std::lround(1000.0 * share)));
+    });
+    if (!pack) {
+        print_error(pack.error().message);
+        return kExitInput;
+    }
+    command.identity.name =
+        command.name.empty() ? std::filesystem::path(command.out).stem().string() : command.name;
+    if (const auto saved = save_pack(command.out, pack->view(), command.identity); !saved) {
+        print_error(saved.error().message);
+        return kExitOutput;
+    }
+    print_result(command, *pack);
+    print_warnings(*pack);
+    return kExitOk;
+}
+
+}  // namespace
+
+void add_train_verb(CLI::App& app, int& exit_code) {
+    auto command = std::make_shared<TrainCommand>();
+    CLI::App* verb = app.add_subcommand("train", "make a solve pack from a rig folder");
+    verb->add_option("--rig", command->rig, "rig folder")->required()->type_name("DIR");
+    verb->add_option("--layout", command->layout, "number of a layout of the folder, or a layout file")
+        ->capture_default_str()
+        ->type_name("N|CSV");
+    const std::map<std::string, SolverKind> solvers = {{"boxqp", SolverKind::kBoxQp},
+                                                       {"nnls", SolverKind::kNonNegative},
+                                                       {"rbf", SolverKind::kRbf},
+                                                       {"lsq", SolverKind::kLeastSquares}};
+    verb->add_option("--solver", command->options.solver, "boxqp, nnls, rbf or lsq")
+        ->transform(CLI::CheckedTransformer(solvers, CLI::ignore_case).description(""))
+        ->type_name("NAME")
+        ->default_str("boxqp");
+    verb->add_option("--take", command->takes, "performances to learn from (CSV); rbf needs one")
+        ->type_name("CSV...");
+    verb->add_option("--cameras", command->cameras,
+                     "cameras.json of the helmet; without it the pack solves marker streams only")
+        ->type_name("JSON");
+    verb->add_option("--noise-mm", command->options.noise_mm, "standard deviation of one marker coordinate")
+        ->capture_default_str()
+        ->type_name("MM");
+    verb->add_option("--rate", command->options.rate_hz, "frame rate it is for")
+        ->capture_default_str()
+        ->type_name("HZ");
+    verb->add_option("--temporal", command->temporal,
+                     "pull towards the previous frame: on, off, auto (on for boxqp), or the step of a weight "
+                     "in a frame")
+        ->capture_default_str()
+        ->type_name("MODE");
+    verb->add_option("--sparsity", command->options.sparsity,
+                     fmt::format("weight of sum |w|, in units of the summed squared marker noise [boxqp: {}]",
+                                 kDefaultSparsity))
+        ->type_name("X");
+    verb->add_option("--ridge", command->options.ridge,
+                     fmt::format("weight of sum w^2, in the same units [boxqp: {}]", kDefaultRidge))
+        ->type_name("X");
+    verb->add_option("--centres", command->options.rbf.centres, "reference frames of the rbf")
+        ->capture_default_str()
+        ->type_name("K");
+    verb->add_option("--dimensions", command->options.rbf.dimensions,
+                     "components of the rbf; 0: by cross-validation")
+        ->capture_default_str()
+        ->type_name("D");
+    verb->add_option("--name", command->name, "name inside the pack [the file's]")->type_name("NAME");
+    verb->add_option("--pack-version", command->identity.pack_version, "version inside the pack")
+        ->capture_default_str();
+    verb->add_option("--out", command->out, "pack file to write")->required()->type_name("PACK");
+    verb->footer(
+        "Examples:\n  headrig train --rig sample --layout 60 --solver boxqp --cameras cameras.json --out "
+        "face.pack\n"
+        "  headrig train --rig sample --solver rbf --take sample/take.csv --out rbf.pack");
+    verb->callback([command, &exit_code] { exit_code = run_train(*command); });
+}
+
+}  // namespace rig::host

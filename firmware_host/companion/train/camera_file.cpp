@@ -1,0 +1,149 @@
+#include "firmware_host/companion/train/camera_file.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "core/limits.hpp"
+#include "core/pack/open_pack.hpp"
+#include "firmware_host/companion/files/whole_file.hpp"
+
+namespace rig::host {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxCameraFileBytes = std::size_t{16} << 20;
+
+// Reads the numbers of one entry; the first thing missing is remembered in `fault`.
+class EntryReader {
+  public:
+    EntryReader(const json& entry, const json& file) : entry_(entry), file_(file) {}
+
+    double number(const char* key, std::optional<double> otherwise = std::nullopt) {
+        for (const json* place : {&entry_, &file_}) {
+            const auto found = place->find(key);
+            if (found == place->end()) continue;
+            if (found->is_number()) return found->get<double>();
+            return missing(fmt::format("\"{}\" is not a number", key));
+        }
+        if (otherwise) return *otherwise;
+        return missing(fmt::format("\"{}\" is missing", key));
+    }
+    int pixels(const char* key) {
+        const double value = number(key);
+        if (value >= 1.0 && value <= 1e6) return static_cast<int>(value);
+        missing(fmt::format("\"{}\" is not a number of pixels", key));
+        return 0;
+    }
+    double element(const char* key, std::size_t row, std::optional<std::size_t> column = std::nullopt) {
+        const auto found = entry_.find(key);
+        if (found == entry_.end()) return missing(fmt::format("\"{}\" is missing", key));
+        const json* value = found->is_array() && row < found->size() ? &(*found)[row] : nullptr;
+        if (value != nullptr && column) {
+            value = value->is_array() && *column < value->size() ? &(*value)[*column] : nullptr;
+        }
+        if (value == nullptr || !value->is_number()) {
+            return missing(fmt::format("\"{}\" is not {} numbers", key, column ? "3 x 3" : "3"));
+        }
+        return value->get<double>();
+    }
+    [[nodiscard]] const std::string& fault() const { return fault_; }
+
+  private:
+    double missing(std::string fault) {
+        if (fault_.empty()) fault_ = std::move(fault);
+        return 0.0;
+    }
+
+    const json& entry_;
+    const json& file_;
+    std::string fault_;
+};
+
+CameraModel read_camera(EntryReader& read, bool one_focal_length) {
+    CameraModel camera;
+    camera.width_px = read.pixels("width");
+    camera.height_px = read.pixels("height");
+    camera.fx_px = read.number(one_focal_length ? "f_px" : "fx_px");
+    camera.fy_px = read.number(one_focal_length ? "f_px" : "fy_px");
+    camera.cx_px = read.number("cx");
+    camera.cy_px = read.number("cy");
+    camera.k1 = read.number("k1", 0.0);
+    camera.k2 = read.number("k2", 0.0);
+    camera.k3 = read.number("k3", 0.0);
+    camera.p1 = read.number("p1", 0.0);
+    camera.p2 = read.number("p2", 0.0);
+    for (std::size_t i = 0; i < 9; ++i) {
+        camera.camera_from_headset(static_cast<int>(i) / 3, static_cast<int>(i) % 3) =
+            read.element("R", i / 3, i % 3);
+    }
+    for (std::size_t i = 0; i < 3; ++i) camera.centre_mm[static_cast<int>(i)] = read.element("centre_mm", i);
+    return camera;
+}
+
+std::string letter_of(const json& entry, std::size_t index) {
+    const auto found = entry.find("camera");
+    return found != entry.end() && found->is_string() ? found->get<std::string>()
+                                                      : fmt::format("number {}", index + 1);
+}
+
+// The entries that are cameras, one for each letter.
+std::vector<const json*> camera_entries(const json& file) {
+    std::vector<const json*> entries;
+    std::set<std::string> letters;
+    for (const char* key : {"cameras", "images"}) {
+        const auto found = file.find(key);
+        if (found == file.end() || !found->is_array()) continue;
+        for (const json& entry : *found) {
+            // A wrong entry is kept, so that it is complained about.
+            if (!entry.is_object() || letters.insert(letter_of(entry, entries.size())).second)
+                entries.push_back(&entry);
+        }
+        break;
+    }
+    return entries;
+}
+
+}  // namespace
+
+Result<std::vector<CameraModel>, FileError> parse_cameras(std::string_view text,
+                                                          const std::filesystem::path& name) {
+    const json file = json::parse(text, nullptr, /*allow_exceptions=*/false);
+    if (file.is_discarded() || !file.is_object()) return file_failure(name, "is not a JSON object");
+    const std::vector<const json*> entries = camera_entries(file);
+    if (entries.empty()) return file_failure(name, "has neither \"cameras\" nor \"images\" with entries");
+    if (entries.size() > kMaxCameras) {
+        return file_failure(
+            name, fmt::format("has {} cameras; a rig carries at most {}", entries.size(), kMaxCameras));
+    }
+    std::vector<CameraModel> cameras;
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+        if (!entries[i]->is_object())
+            return file_failure(name, fmt::format("camera number {} is not an object", i + 1));
+        const std::string letter = printable(letter_of(*entries[i], i));
+        EntryReader read(*entries[i], file);
+        const bool one_focal_length = entries[i]->contains("f_px") || file.contains("f_px");
+        const CameraModel camera = read_camera(read, one_focal_length);
+        if (!read.fault().empty())
+            return file_failure(name, fmt::format("camera {}: {}", letter, read.fault()));
+        if (const auto ok = check_camera(camera); !ok) {
+            return file_failure(name, fmt::format("camera {}: {}", letter, pack_error_text(ok.error())));
+        }
+        cameras.push_back(camera);
+    }
+    return cameras;
+}
+
+Result<std::vector<CameraModel>, FileError> load_cameras(const std::filesystem::path& path) {
+    const auto text = read_whole_text(path);
+    if (!text) return failure(text.error());
+    if (text->size() > kMaxCameraFileBytes) return file_failure(path, "is too large for a list of cameras");
+    return parse_cameras(*text, path);
+}
+
+}  // namespace rig::host

@@ -1,0 +1,24 @@
+// cameras.json: the calibrated cameras of a helmet, as `headrig world` and calibration write them.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "core/geometry/camera_model.hpp"
+#include "firmware_host/companion/files/file_error.hpp"
+
+namespace rig::host {
+
+// Takes the top-level array "cameras" when there is one; otherwise, of "images", the first image of each
+// camera letter. An entry has "R" (3x3, X_cam = R (X_head - centre), x right, y down, z forward) and
+// "centre_mm"; its "width", "height", "f_px" (or "fx_px", "fy_px"), "cx", "cy", "k1", "k2" and, when not 0,
+// "p1", "p2", "k3" may stand at the top level instead. At most kMaxCameras, each plausible by core's own
+// rule. Errors name the file and the camera.
+[[nodiscard]] Result<std::vector<CameraModel>, FileError> load_cameras(const std::filesystem::path& path);
+
+// The same from text; `name` stands for the file in errors.
+[[nodiscard]] Result<std::vector<CameraModel>, FileError> parse_cameras(std::string_view text,
+                                                                        const std::filesystem::path& name);
+
+}  // namespace rig::host
