@@ -40,7 +40,12 @@ std::string silence_text(LinkSession& link) {
 }  // namespace
 
 CLI::Option* add_link_option(CLI::App& verb, std::string& link) {
+    const auto well_formed = [](const std::string& text) {
+        const auto spec = parse_link_spec(text);
+        return spec ? std::string() : spec.error().message;
+    };
     return verb.add_option("-l,--link", link, "where the rig is: " + std::string(kLinkSpecHelp))
+        ->check(CLI::Validator(well_formed, ""))
         ->type_name("LINK");
 }
 
