@@ -20,7 +20,7 @@
 #include "firmware_host/companion/train/camera_file.hpp"
 #include "firmware_host/companion/train/pack_writer.hpp"
 #include "firmware_host/companion/replay/replay_log.hpp"
-#include "firmware_host/daemon/stream_digest.hpp"
+#include "firmware_host/take_log/stream_digest.hpp"
 #include "firmware_host/pack_file/opened_pack.hpp"
 
 namespace rig::host {

@@ -4,8 +4,8 @@
 
 #include "core/pipeline/pipeline.hpp"
 #include "firmware_host/companion/files/whole_file.hpp"
-#include "firmware_host/daemon/observation_log.hpp"
-#include "firmware_host/daemon/stream_digest.hpp"
+#include "firmware_host/take_log/observation_log.hpp"
+#include "firmware_host/take_log/stream_digest.hpp"
 
 namespace rig::host {
 

@@ -81,7 +81,7 @@ class LinkVerbs : public testing::Test {
     // Runs `headrig <arguments>` with its output in files; with interrupt_after_s >= 0 it gets a Ctrl-C then.
     Ran run(const std::vector<std::string>& arguments, double interrupt_after_s = -1.0) {
         const pid_t child = fork();
-        if (child == 0) become_headrig(arguments);
+        if (child == 0) become_companion(arguments);
         if (interrupt_after_s >= 0.0) {
             usleep(static_cast<useconds_t>(interrupt_after_s * 1.0e6));
             kill(child, SIGINT);
@@ -95,13 +95,13 @@ class LinkVerbs : public testing::Test {
     test::TempFolder folder_;
 
   private:
-    [[noreturn]] void become_headrig(std::vector<std::string> arguments) {
+    [[noreturn]] void become_companion(std::vector<std::string> arguments) {
         if (std::freopen(path("out").c_str(), "w", stdout) == nullptr) _exit(126);
         if (std::freopen(path("err").c_str(), "w", stderr) == nullptr) _exit(126);
-        std::vector<char*> words{const_cast<char*>(RIG_HEADRIG)};
+        std::vector<char*> words{const_cast<char*>(RIG_COMPANION_PROGRAM)};
         for (std::string& argument : arguments) words.push_back(argument.data());
         words.push_back(nullptr);
-        execv(RIG_HEADRIG, words.data());
+        execv(RIG_COMPANION_PROGRAM, words.data());
         _exit(127);
     }
 };
