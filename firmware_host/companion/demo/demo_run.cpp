@@ -124,16 +124,16 @@ Result<OpenedPack, FileError> make_pack(const DemoOptions& options, const Stage&
 // What arrives at the host, frame by frame of the world.
 class Reception {
   public:
-    Reception(const Stage& stage, const HandOver& hand_over, bool real_time)
+    Reception(const Stage& stage, const HandOver& hand_over, const ServerCounters& served, bool real_time)
         : accuracy(*stage.world, stage.model),
           world_(*stage.world),
           hand_over_(hand_over),
+          served_(served),
           real_time_(real_time),
           states_(stage.world->frame_count()),
           have_(stage.world->frame_count(), false) {}
 
     void take_state(const ReceivedState& received) {
-        if (!first_us_) first_us_ = received.state.capture_us;
         const auto frame = frame_of(received.state.sequence, received.state.capture_us);
         if (!frame || have_[*frame]) return;
         have_[*frame] = true;
@@ -183,7 +183,7 @@ class Reception {
     std::optional<std::size_t> frame_of(std::uint32_t sequence, std::int64_t capture_us) const {
         std::size_t frame = sequence;
         if (real_time_) {
-            const double since_s = static_cast<double>(capture_us - first_us_.value_or(capture_us)) * 1e-6;
+            const double since_s = static_cast<double>(capture_us - served_.start_us) * 1e-6;
             frame = static_cast<std::size_t>(std::llround(std::max(0.0, since_s) * world_.config().rate_hz));
         }
         if (frame >= world_.frame_count()) return std::nullopt;
@@ -192,13 +192,13 @@ class Reception {
 
     const World& world_;
     const HandOver& hand_over_;
+    const ServerCounters& served_;
     bool real_time_;
     std::vector<FaceState> states_;
     std::vector<bool> have_;
     std::vector<double> latencies_ms_;
     std::uint64_t received_ = 0;
     std::int64_t last_received_us_ = 0;
-    std::optional<std::int64_t> first_us_;
 };
 
 Result<ChildProcess, FileError> start_daemon(const DemoOptions& options, const std::filesystem::path& socket,
@@ -411,7 +411,7 @@ Result<DemoFigures, FileError> run_demo(const DemoOptions& options, const DemoEv
     auto link = open_line(options, line, *daemon);
     if (!link) return failure(link.error());
 
-    Reception reception(*stage, hand_over, options.real_time);
+    Reception reception(*stage, hand_over, server.counters(), options.real_time);
     Health health;
     SessionOptions wanted;
     wanted.streams = kStreamWeights | kStreamMarkers | kStreamStatus;
