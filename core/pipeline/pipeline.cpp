@@ -117,7 +117,9 @@ void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& rep
         state.cameras[c] = c < pack_.camera_count && configured_ ? CameraStatus::kMissing : CameraStatus::kUnused;
     }
     sightings_.clear();
+    named_ = NamedMarkers{};  // a tick without pictures has no markers, not the last ones
     named_.capture_us = capture_us;
+    named_.count = configured_ ? pack_.marker_count : std::uint16_t{0};
 }
 
 void Pipeline::take_observations(std::size_t camera, std::span<const Observation> observations, FrameReport& report) {
@@ -298,7 +300,8 @@ void Pipeline::hold(std::int64_t capture_us, FaceState& state) {
     if (sent_any_) state.capture_us = sent_us_;
     write_slip(stabilised_.headset_from_face, state.slip);
     if (ladder_.state <= TrackingState::kHold) reset_recovery(recovery_);
-    if (ladder_.state != TrackingState::kLost || config_.loss_policy != LossPolicy::kDecay) return;
+    if (!ladder_.ever_usable || ladder_.state != TrackingState::kLost) return;
+    if (config_.loss_policy != LossPolicy::kDecay) return;
     const std::int64_t since_us = elapsed_us(last_usable_us_, capture_us) - ladder_config_.lost_after_us;
     const double left = 1.0 - std::clamp(static_cast<double>(since_us) / static_cast<double>(kDecayUs), 0.0, 1.0);
     for (std::size_t i = 0; i < pack_.shape_count; ++i) {

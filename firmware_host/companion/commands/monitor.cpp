@@ -100,7 +100,9 @@ int run_monitor(const MonitorOptions& options) {
     }
     session.leave();
     if (gathered.states > 0) return kExitOk;
-    return interrupted() ? kExitInterrupted : report_end(LinkSession::End::kTimeout, *link);
+    if (interrupted()) return kExitInterrupted;
+    const bool refused = session.phase() == SessionPhase::kRefused;
+    return report_end(refused ? LinkSession::End::kRefused : LinkSession::End::kTimeout, *link);
 }
 
 }  // namespace

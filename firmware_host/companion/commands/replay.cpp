@@ -3,14 +3,12 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
-#include "core/pipeline/pipeline.hpp"
 #include "firmware_host/companion/commands/console.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/files/csv.hpp"
-#include "firmware_host/companion/files/whole_file.hpp"
-#include "firmware_host/daemon/observation_log.hpp"
-#include "firmware_host/daemon/stream_digest.hpp"
+#include "firmware_host/companion/replay/replay_log.hpp"
 #include "firmware_host/pack_file/opened_pack.hpp"
 
 namespace rig::host {
@@ -24,99 +22,42 @@ struct ReplayOptions {
     bool another_pack = false;
 };
 
-const char* fault_of(ObservationLogError error) {
-    switch (error) {
-        case ObservationLogError::kOpen: return "cannot be read";
-        case ObservationLogError::kFormat: return "is no observation log; `headrigd --log-observations FILE` writes one";
-        case ObservationLogError::kCut: return "ends inside a record: the recording was cut; all frames before it were solved";
-        case ObservationLogError::kDamaged: return "holds a damaged record; all frames before it were solved";
-    }
-    return "cannot be used";
-}
-
-PipelineConfig config_of(const ObservationLogHeader& header) {
-    PipelineConfig config;
-    config.filter = header.filter;
-    config.stabilise = header.stabilise;
-    config.rate_hz = static_cast<double>(header.rate_millihertz) * 1e-3;
-    config.loss_policy = header.loss_policy == 1 ? LossPolicy::kDecay : LossPolicy::kHold;
-    return config;
-}
-
-ObservationFrame frame_of(const ObservationTick& tick, std::uint8_t camera_count) {
-    ObservationFrame frame;
-    frame.capture_us = tick.capture_us;
-    frame.cameras = tick.cameras;
-    frame.status = tick.status;
-    frame.camera_count = camera_count;
-    return frame;
-}
-
-// Solves every whole record; the error that ended the log early, if any, is returned after all before it is done.
-Result<void, ObservationLogError> solve_log(ObservationLogReader& reader, std::size_t bytes, const SolvePack& pack,
-                                            Pipeline& pipeline, CsvWriter& csv, StreamDigest& digest) {
-    const auto state = std::make_unique<FaceState>();
-    const auto report = std::make_unique<FrameReport>();
-    Progress progress("replay", bytes);
-    std::int64_t first_us = 0;
-    while (!reader.at_end() && !interrupted()) {
-        const auto tick = reader.next();
-        if (!tick) return failure(tick.error());
-        if (tick->reset_before) pipeline.reset_tracking();
-        pipeline.step(frame_of(*tick, reader.header().camera_count), *state, *report);
-        digest.add(*state);
-        if (digest.ticks() == 1) first_us = tick->capture_us;
-        csv.integer(static_cast<std::int64_t>(digest.ticks()) - 1);
-        csv.number(static_cast<double>(tick->capture_us - first_us) * 1e-6, 6);
-        for (std::size_t i = 0; i < pack.shape_count; ++i) csv.number(static_cast<double>(state->weights[i]), 6);
-        csv.end_row();
-    }
-    return {};
-}
-
 int run_replay(const ReplayOptions& options) {
     const auto opened = open_pack_file(options.pack);
-    const auto bytes = read_whole_file(options.log);
-    if (!opened || !bytes) {
-        print_error(opened ? bytes.error().message : opened.error().message);
-        return kExitInput;
-    }
-    auto reader = ObservationLogReader::open(*bytes);
-    if (!reader) {
-        print_error(fmt::format("{}: {}", options.log, fault_of(reader.error())));
-        return kExitInput;
-    }
-    if (reader->header().pack_hash != opened->manifest().manifest_hash && !options.another_pack) {
-        print_error(fmt::format("{}: was recorded with another pack than {}; --another-pack solves it all the same",
-                                options.log, options.pack));
+    if (!opened) {
+        print_error(opened.error().message);
         return kExitInput;
     }
     const SolvePack& pack = opened->pack();
-    const auto pipeline = std::make_unique<Pipeline>();
-    if (pack.camera_count != reader->header().camera_count || !pipeline->configure(pack, config_of(reader->header()))) {
-        print_error(fmt::format("{}: {} cameras, but {} was recorded with {}", options.pack, pack.camera_count, options.log,
-                                reader->header().camera_count));
-        return kExitInput;
-    }
     std::vector<std::string> columns{"frame", "time_s"};
     for (std::size_t i = 0; i < pack.shape_count; ++i) columns.emplace_back(pack.shape_names[i]);
     CsvWriter csv(columns);
-    StreamDigest digest;
+    std::int64_t row = 0;
     install_interrupt_handler();
-    const auto solved = solve_log(*reader, bytes->size(), pack, *pipeline, csv, digest);
+    const auto replayed = replay_log({options.log, options.pack, options.another_pack}, *opened,
+                                     [&](const FaceState& state, double time_s) {
+                                         csv.integer(row++).number(time_s, 6);
+                                         for (std::size_t i = 0; i < pack.shape_count; ++i) {
+                                             csv.number(static_cast<double>(state.weights[i]), 6);
+                                         }
+                                         csv.end_row();
+                                         return !interrupted();
+                                     });
     if (interrupted()) return kExitInterrupted;
+    if (!replayed) {
+        print_error(replayed.error().message);
+        return kExitInput;
+    }
     if (!options.weights_csv.empty()) {
         if (const auto saved = csv.save(options.weights_csv); !saved) {
             print_error(saved.error().message);
             return kExitOutput;
         }
     }
-    fmt::print("digest {:016x} over {} ticks\n", digest.value(), digest.ticks());
-    if (!solved) {
-        print_error(fmt::format("{}: {}", options.log, fault_of(solved.error())));
-        return kExitInput;
-    }
-    return kExitOk;
+    fmt::print("digest {:016x} over {} ticks\n", replayed->digest, replayed->ticks);
+    if (replayed->cut.empty()) return kExitOk;
+    print_error(replayed->cut);
+    return kExitInput;
 }
 
 }  // namespace

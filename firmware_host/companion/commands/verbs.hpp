@@ -23,6 +23,7 @@ void add_info_verb(CLI::App& app, int& exit_code);
 void add_monitor_verb(CLI::App& app, int& exit_code);
 void add_pack_verb(CLI::App& app, int& exit_code);
 void add_record_verb(CLI::App& app, int& exit_code);
+void add_replay_verb(CLI::App& app, int& exit_code);
 void add_sample_verb(CLI::App& app, int& exit_code);
 void add_solve_verb(CLI::App& app, int& exit_code);
 void add_status_verb(CLI::App& app, int& exit_code);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/stabilise/stabiliser.hpp"
 #include "tests/support/synthetic_face.hpp"
 
 namespace rig {
