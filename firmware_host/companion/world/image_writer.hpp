@@ -14,8 +14,8 @@ struct ImageOptions {
     bool png = false;      // else PGM
     std::size_t step = 1;  // every step-th frame
     std::size_t threads = 2;
-    std::string layout;  // as named on the command line, for cameras.json
-    CameraControl control;
+    std::string layout{};  // as named on the command line, for cameras.json
+    CameraControl control{};
 };
 
 // Called after each frame from any rendering thread, one call at a time; false stops the run.

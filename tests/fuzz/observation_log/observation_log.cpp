@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "core/base/check.hpp"
-#include "firmware_host/daemon/observation_log.hpp"
+#include "firmware_host/take_log/observation_log.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     auto log = rig::ObservationLogReader::open(std::as_bytes(std::span(data, size)));

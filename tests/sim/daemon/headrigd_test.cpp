@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "firmware_host/daemon/observation_log.hpp"
+#include "firmware_host/take_log/observation_log.hpp"
 #include "hal/linux/monotonic_clock.hpp"
 #include "tests/contract/hal/fake_world.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -28,7 +28,7 @@ class Headrigd : public testing::Test {
   protected:
     // Starts it with its output in files of the folder.
     void start(std::vector<std::string> arguments) {
-        arguments.insert(arguments.begin(), RIG_HEADRIGD);
+        arguments.insert(arguments.begin(), RIG_DAEMON_PROGRAM);
         std::vector<char*> argv;
         for (std::string& argument : arguments) argv.push_back(argument.data());
         argv.push_back(nullptr);
@@ -38,7 +38,7 @@ class Headrigd : public testing::Test {
                                          0644);
         posix_spawn_file_actions_addopen(&actions, 2, (folder_ / "err").c_str(), O_WRONLY | O_CREAT | O_TRUNC,
                                          0644);
-        ASSERT_EQ(posix_spawn(&pid_, RIG_HEADRIGD, &actions, nullptr, argv.data(), environ), 0);
+        ASSERT_EQ(posix_spawn(&pid_, RIG_DAEMON_PROGRAM, &actions, nullptr, argv.data(), environ), 0);
         posix_spawn_file_actions_destroy(&actions);
     }
     // Exit code; 128 + n for a signal n; -1 when it does not end within 20 s and has to be ended.
