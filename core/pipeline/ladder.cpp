@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/base/elapsed.hpp"
+
 namespace rig {
 
 namespace {
@@ -14,7 +16,9 @@ std::uint16_t counted(std::uint16_t run, bool goes_on) {
 void climb(const LadderConfig& config, const LadderInput& input, LadderState& s) {
     if (s.state == TrackingState::kLost) s.state = TrackingState::kHold;
     if (s.state == TrackingState::kHold) {
-        if (s.usable_run >= config.good_frames) s.state = input.partial ? TrackingState::kPartial : TrackingState::kLive;
+        if (s.usable_run >= config.good_frames) {
+            s.state = s.whole_run >= config.good_frames ? TrackingState::kLive : TrackingState::kPartial;
+        }
     } else if (input.partial) {
         s.state = TrackingState::kPartial;
     } else if (s.state == TrackingState::kPartial && s.whole_run >= config.good_frames) {
@@ -24,10 +28,11 @@ void climb(const LadderConfig& config, const LadderInput& input, LadderState& s)
 
 void fall(const LadderConfig& config, const LadderInput& input, LadderState& s) {
     const auto three_frames_us = static_cast<std::int64_t>(3e6 / config.rate_hz);
-    const std::int64_t silent_us = input.now_us - s.last_usable_us;
-    if (s.ever_usable && silent_us < std::max(config.hold_after_us, three_frames_us)) return;
+    if (input.now_us < s.last_usable_us) s.last_usable_us = input.now_us;  // the clock went back: count from there
+    const std::int64_t silent_us = elapsed_us(s.last_usable_us, input.now_us);
+    if (silent_us < std::max(config.hold_after_us, three_frames_us)) return;
     if (s.state > TrackingState::kHold) s.state = TrackingState::kHold;
-    if (s.ever_usable && silent_us >= config.lost_after_us) s.state = TrackingState::kLost;
+    if (silent_us >= config.lost_after_us) s.state = TrackingState::kLost;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/check.hpp"
+#include "core/base/elapsed.hpp"
 #include "core/base/math.hpp"
 
 namespace rig {
@@ -54,6 +55,7 @@ Result<void, PipelineError> Pipeline::configure(const SolvePack& pack, const Pip
     reset_tracking();
     ladder_ = LadderState{};
     was_live_ = false;
+    sent_any_ = false;
     configured_ = true;
     return {};
 }
@@ -95,6 +97,15 @@ void Pipeline::reset_tracking() {
     reset_one_euro(smoothing_);
 }
 
+// After a loss nothing of before helps any more. A search for identities that is under way goes on.
+void Pipeline::forget() {
+    if (track_report_.tracking) reset_tracker(tracker_);
+    track_report_.tracking = false;
+    reset_stabiliser(stabiliser_);
+    reset_solver(solver_);
+    reset_one_euro(smoothing_);
+}
+
 void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& report) {
     report = FrameReport{};
     report.labels.fill(-1);
@@ -106,7 +117,9 @@ void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& rep
         state.cameras[c] = c < pack_.camera_count && configured_ ? CameraStatus::kMissing : CameraStatus::kUnused;
     }
     sightings_.clear();
+    named_ = NamedMarkers{};  // a tick without pictures has no markers, not the last ones
     named_.capture_us = capture_us;
+    named_.count = configured_ ? pack_.marker_count : std::uint16_t{0};
 }
 
 void Pipeline::take_observations(std::size_t camera, std::span<const Observation> observations, FrameReport& report) {
@@ -240,7 +253,7 @@ void Pipeline::finish(std::int64_t capture_us, bool usable, FaceState& state, Fr
     step_ladder(ladder_config_, input, ladder_);
     state.state = ladder_.state;
     if (configured_) {
-        if (!usable && track_report_.tracking && ladder_.state == TrackingState::kLost) reset_tracking();
+        if (!usable && ladder_.state == TrackingState::kLost) forget();
         put_out(capture_us, usable, state);
     }
     raise_faults(usable, report, state);
@@ -266,7 +279,10 @@ void Pipeline::put_out(std::int64_t capture_us, bool usable, FaceState& state) {
         }
         was_live_ = was_live_ || up;
         state.held = recovery.phase == RecoveryPhase::kHeld;
-        last_solved_us_ = capture_us;
+        sent_any_ = sent_any_ || !state.held;
+        if (!state.held) sent_us_ = capture_us;
+        if (sent_any_) state.capture_us = sent_us_;  // of the weights, which may be older than this frame
+        last_usable_us_ = capture_us;
         lost_from_ = sent_;
         write_slip(stabilised_.headset_from_face, state.slip);
     } else {
@@ -281,11 +297,12 @@ void Pipeline::put_out(std::int64_t capture_us, bool usable, FaceState& state) {
 
 void Pipeline::hold(std::int64_t capture_us, FaceState& state) {
     state.held = true;
-    if (ladder_.ever_usable) state.capture_us = last_solved_us_;
+    if (sent_any_) state.capture_us = sent_us_;
     write_slip(stabilised_.headset_from_face, state.slip);
     if (ladder_.state <= TrackingState::kHold) reset_recovery(recovery_);
-    if (ladder_.state != TrackingState::kLost || config_.loss_policy != LossPolicy::kDecay) return;
-    const std::int64_t since_us = capture_us - last_solved_us_ - ladder_config_.lost_after_us;
+    if (!ladder_.ever_usable || ladder_.state != TrackingState::kLost) return;
+    if (config_.loss_policy != LossPolicy::kDecay) return;
+    const std::int64_t since_us = elapsed_us(last_usable_us_, capture_us) - ladder_config_.lost_after_us;
     const double left = 1.0 - std::clamp(static_cast<double>(since_us) / static_cast<double>(kDecayUs), 0.0, 1.0);
     for (std::size_t i = 0; i < pack_.shape_count; ++i) {
         sent_[i] = rest(pack_, i) + left * (lost_from_[i] - rest(pack_, i));

@@ -50,6 +50,7 @@ class Pipeline {
 
   private:
     void configure_stages(const PipelineConfig& config);
+    void forget();
     void begin(std::int64_t capture_us, FaceState& state, FrameReport& report);
     void take_observations(std::size_t camera, std::span<const Observation> observations, FrameReport& report);
     void track_sightings(FrameReport& report);
@@ -99,9 +100,11 @@ class Pipeline {
     LadderConfig ladder_config_;
     LadderState ladder_;
     bool was_live_ = false;
+    bool sent_any_ = false;  // some solve has been put out
 
     std::uint32_t sequence_ = 0;
-    std::int64_t last_solved_us_ = 0;
+    std::int64_t last_usable_us_ = 0;  // when the silence began that the decay to rest counts from
+    std::int64_t sent_us_ = 0;         // capture time of the frame behind sent_
     std::array<double, kMaxShapes> smoothed_{};
     std::array<double, kMaxShapes> sent_{};  // the weights last put out
     std::array<double, kMaxShapes> lost_from_{};  // ... when the face was lost: where the decay to rest starts

@@ -58,8 +58,8 @@ bool free_step(const BoxQpProblem& p, std::size_t count, BoxQpWorkspace& ws) {
     return true;
 }
 
-// Walks along the step as far as the bounds allow. Every variable that reaches a bound on the way is fixed there and
-// the walk goes on with the others (a projected step) as long as the objective falls; returns true for a full step.
+// Walks along the step as far as the bounds allow. The variable that reaches its bound first is fixed there, and the
+// next iteration takes a step with the others; returns true for a full step.
 bool walk(const BoxQpProblem& p, std::size_t count, BoxQpState& state, BoxQpWorkspace& ws, std::span<double> w) {
     double length = 1.0;
     std::size_t blocking = count;
@@ -68,7 +68,7 @@ bool walk(const BoxQpProblem& p, std::size_t count, BoxQpState& state, BoxQpWork
         const double d = ws.step[a];
         if (d == 0.0) continue;
         const double room = d > 0.0 ? p.high[i] - w[i] : p.low[i] - w[i];
-        if (d * length > 0.0 ? d * length > room : d * length < room) {
+        if (d > 0.0 ? d * length > room : d * length < room) {
             length = room / d;
             blocking = a;
         }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/elapsed.hpp"
 #include "core/base/math.hpp"
 
 namespace rig {
@@ -44,22 +45,25 @@ void fill_bounds(const SolverConfig& config, SolverWorkspace& w) {
 
 double gamma_scale(const SolverConfig& config, const SolverState& state, std::int64_t capture_us) {
     if (!state.has_previous) return 0.0;
-    const double gap_s = static_cast<double>(capture_us - state.previous_us) * 1e-6;
+    const double gap_s = static_cast<double>(elapsed_us(state.previous_us, capture_us)) * 1e-6;
     if (gap_s > config.forget_s || gap_s < 0.0) return 0.0;
     return 1.0 / std::max(1.0, gap_s * config.rate_hz);
 }
 
-// Confidence depends on what is seen, not on where it is, so it is kept until that changes.
-void update_confidence(const SolverConfig& config, const StabiliserOutput& stabilised, SolverState& state,
-                       SolverWorkspace& w) {
+constexpr double kSameInformation = 0.05;  // of the trace: a ray turns by less while a marker moves about its place
+
+// Confidence depends on what is seen and from where, not on where it is, so it is kept until that changes: a marker
+// comes or goes, or a camera does.
+void update_confidence(const SolverConfig& config, SolverState& state, SolverWorkspace& w) {
     const SolvePack& pack = config.pack;
     bool same = state.has_confidence;
-    for (std::size_t k = 0; k < pack.marker_count; ++k) {
-        const std::uint8_t seen = stabilised.markers[k].seen ? 1 : 0;
-        same = same && state.pattern[k] == seen;
-        state.pattern[k] = seen;
+    for (std::size_t k = 0; k < pack.marker_count && same; ++k) {
+        const Vec3 now = w.weights[k].diagonal();
+        const Vec3 change = now - state.seen_weight[k];
+        same = change.cwiseAbs().maxCoeff() <= kSameInformation * now.sum();
     }
     if (same) return;
+    for (std::size_t k = 0; k < pack.marker_count; ++k) state.seen_weight[k] = w.weights[k].diagonal();
     const ConfidenceInput input{w.equations.hessian, w.equations.data_diagonal, pack.prior_sigma,
                                 static_cast<double>(pack.noise_mm)};
     weight_confidence(input, w.confidence, state.confidence);
@@ -130,7 +134,7 @@ void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const
     input.gamma_scale = gamma_scale(config, state, capture_us);
     build_normal_equations(pack, config.tables, input, w.equations);
     report.markers_used = static_cast<std::uint16_t>(w.equations.markers_used);
-    update_confidence(config, stabilised, state, w);
+    update_confidence(config, state, w);
     output.confidence = state.confidence;
     if (seen < kMinMarkers) {
         output.weights = state.previous;

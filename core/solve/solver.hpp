@@ -33,7 +33,7 @@ struct SolverState {
     std::array<double, kMaxShapes> previous{};
     // Confidence changes only with what is seen, so it is kept until that changes.
     bool has_confidence = false;
-    std::array<std::uint8_t, kMaxMarkers> pattern{};
+    std::array<Vec3, kMaxMarkers> seen_weight{};  // diagonals of the V behind it; zero: not seen
     std::array<float, kMaxShapes> confidence{};
 };
 

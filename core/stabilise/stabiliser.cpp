@@ -8,7 +8,9 @@ namespace rig {
 
 namespace {
 
-constexpr double kHeldSigma = 1e-9;  // mm and rad: a pose that must not move
+// mm and rad: a pose that must not move. Its square beside a mode's prior of 1 has to stay within the 14 digits that
+// the Cholesky factor asks for, or the fit is refused and nothing is inferred.
+constexpr double kHeldSigma = 1e-6;
 
 std::size_t fill_input(const NamedMarkers& named, StabiliserWorkspace& w) {
     std::size_t seen = 0;

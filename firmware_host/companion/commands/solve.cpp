@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -98,7 +99,9 @@ void add_results(const SolveOptions& options, const SolvePack& pack, std::size_t
     for (std::size_t s = 0; s < slots; ++s) results.labels.values.push_back(report.labels[s]);
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         for (Eigen::Index axis = 0; axis < 3; ++axis) {
-            results.points.values.push_back(static_cast<float>(report.face_markers_mm[k][axis]));
+            // A frame without a solve has no completed markers: NaN, as in the input, never a position.
+            results.points.values.push_back(report.solved ? static_cast<float>(report.face_markers_mm[k][axis])
+                                                          : std::numeric_limits<float>::quiet_NaN());
         }
     }
 }

@@ -16,7 +16,8 @@ struct Scene {
     explicit Scene(const test::SyntheticFaceOptions& options) : face(options) {
         const SolvePack pack = face.pack();
         auto scratch = std::make_unique<ShapeModelWorkspace>();
-        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch, *model);
+        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
+                          *model);
     }
 
     // Frames until found, or 0 when not within `frames`.
@@ -47,7 +48,8 @@ struct Scene {
 };
 
 constexpr double kSixDegrees = 6.0 * std::numbers::pi / 180.0;
-// A start is right when every marker is predicted nearer to itself than any neighbour can be: the tracker's gate.
+// A start is right when every marker is predicted nearer to itself than any neighbour can be: the tracker's
+// gate.
 constexpr double kRightMm = 3.0;
 
 struct Shares {
@@ -63,15 +65,17 @@ Shares start_from_points(std::size_t markers, int trials, double rotation_rad, d
     test::SeededRandom random(81 + markers);
     Shares shares;
     for (int i = 0; i < trials; ++i) {
-        const std::vector<Vec3> truth = test::moved(test::random_slip(random, rotation_rad, translation_mm),
-                                                    s.face.positions(s.face.weights_at(random.uniform(0.0, 100.0))));
+        const std::vector<Vec3> truth =
+            test::moved(test::random_slip(random, rotation_rad, translation_mm),
+                        s.face.positions(s.face.weights_at(random.uniform(0.0, 100.0))));
         std::vector<Vec3> cloud;
         for (const Vec3& point : truth) {
             if (!random.chance(0.05)) cloud.push_back(point);
         }
         test::add_noise(cloud, 0.1, random);
         for (int g = 0; g < 2; ++g) {
-            cloud.emplace_back(random.uniform(-80.0, 80.0), random.uniform(-120.0, 60.0), random.uniform(-60.0, 30.0));
+            cloud.emplace_back(random.uniform(-80.0, 80.0), random.uniform(-120.0, 60.0),
+                               random.uniform(-60.0, 30.0));
         }
         random.shuffle(std::span<Vec3>(cloud));
         s.sightings->clear();
@@ -82,8 +86,8 @@ Shares start_from_points(std::size_t markers, int trials, double rotation_rad, d
         shares.slowest_frame = std::max(shares.slowest_frame, frame);
         if (s.worst_mm(truth) < kRightMm) ++shares.right;
     }
-    std::printf("%zu markers: %d found, %d right of %d, slowest after %d frames\n", markers, shares.found, shares.right,
-                trials, shares.slowest_frame);
+    std::printf("%zu markers: %d found, %d right of %d, slowest after %d frames\n", markers, shares.found,
+                shares.right, trials, shares.slowest_frame);
     return shares;
 }
 
@@ -102,6 +106,26 @@ TEST(Bootstrap, SmallSlipsNeedOneFrame) {
     EXPECT_EQ(shares.slowest_frame, 1);
 }
 
+// Real dots that would be named as another marker by the pose and expression found. A false dot in the place
+// of a hidden marker is not counted: one frame cannot tell.
+int wrong_names(Scene& s, const std::vector<test::SyntheticFace::View>& views) {
+    std::vector<Vec3> predicted;
+    for (std::size_t k = 0; k < s.face.marker_count(); ++k)
+        predicted.push_back(s.fit->headset_position(*s.model, k));
+    auto matches = std::make_unique<Matches>();
+    match_views(predicted, *s.sightings, 3.0, s.workspace->matching, *matches);
+    int wrong = 0;
+    for (std::size_t c = 0; c < views.size(); ++c) {
+        for (std::size_t k = 0; k < predicted.size(); ++k) {
+            const std::int16_t at = (*matches)[c][k];
+            if (at < 0) continue;
+            const int is = views[c].marker[s.sightings->source[c][static_cast<std::size_t>(at)]];
+            if (is >= 0 && is != static_cast<int>(k)) ++wrong;
+        }
+    }
+    return wrong;
+}
+
 struct CameraCase {
     std::size_t cameras;
     int right_at_least;
@@ -115,11 +139,13 @@ TEST_P(BootstrapFromCameras, FindsTheFaceWithHiddenMarkersAndFalseDots) {
     Scene s(options);
     test::SeededRandom random(85);
     constexpr int kTrials = 60;
+    int most_wrong = 0;
     int found = 0;
     int right = 0;
     for (int i = 0; i < kTrials; ++i) {
-        const std::vector<Vec3> truth = test::moved(test::random_slip(random, 0.05, 4.0),
-                                                    s.face.positions(s.face.weights_at(random.uniform(0.0, 100.0))));
+        const std::vector<Vec3> truth =
+            test::moved(test::random_slip(random, 0.05, 4.0),
+                        s.face.positions(s.face.weights_at(random.uniform(0.0, 100.0))));
         s.sightings->clear();
         std::vector<test::SyntheticFace::View> views;
         for (std::size_t c = 0; c < options.camera_count; ++c) {
@@ -128,28 +154,22 @@ TEST_P(BootstrapFromCameras, FindsTheFaceWithHiddenMarkersAndFalseDots) {
         }
         if (s.search(9) == 0) continue;
         ++found;
-        // A false dot in the place of a hidden marker cannot be told apart in one frame; one marker named as another can.
-        int wrong = 0;
-        for (std::size_t c = 0; c < options.camera_count; ++c) {
-            for (std::size_t k = 0; k < truth.size(); ++k) {
-                const std::int16_t at = s.workspace->matches[c][k];
-                if (at < 0) continue;
-                const int is = views[c].marker[s.sightings->source[c][static_cast<std::size_t>(at)]];
-                if (is >= 0 && is != static_cast<int>(k)) {
-                    ++wrong;
-                    std::printf("cam %zu of %zu: %zu named for %d, %.2f mm\n", c, options.camera_count, k, is, std::sqrt(s.sightings->views[c][static_cast<std::size_t>(at)].squared_distance_mm2(truth[k])));
-                }
-            }
-        }
+        const int wrong = wrong_names(s, views);
+        most_wrong = std::max(most_wrong, wrong);
         if (wrong == 0) ++right;
     }
-    std::printf("%zu cameras: %d found, %d right of %d\n", options.camera_count, found, right, kTrials);
+    std::printf("%zu cameras: %d found, %d right of %d, at most %d wrong names\n", options.camera_count,
+                found, right, kTrials, most_wrong);
+    // One camera cannot see that a marker is turned away: at the rim of the face such a one may take its
+    // neighbour's dot in the first frame. The tracker mends that (tracker_test.cpp); a wrong pose it could
+    // not mend.
+    EXPECT_EQ(found, kTrials);
     EXPECT_GE(right, GetParam().right_at_least);
-    EXPECT_LE(found - right, kTrials / 20);
+    EXPECT_LE(most_wrong, 3);
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, BootstrapFromCameras,
-                         testing::Values(CameraCase{1, 54}, CameraCase{2, 57}, CameraCase{4, 57}));
+                         testing::Values(CameraCase{1, 50}, CameraCase{2, 57}, CameraCase{4, 59}));
 
 TEST(Bootstrap, DoesNotFindAFaceWhereThereIsNone) {
     Scene s({});
@@ -158,7 +178,8 @@ TEST(Bootstrap, DoesNotFindAFaceWhereThereIsNone) {
         std::vector<Vec3> cloud;
         const std::size_t count = 1 + random.below(120);
         for (std::size_t p = 0; p < count; ++p) {
-            cloud.emplace_back(random.uniform(-90.0, 90.0), random.uniform(-130.0, 70.0), random.uniform(-80.0, 40.0));
+            cloud.emplace_back(random.uniform(-90.0, 90.0), random.uniform(-130.0, 70.0),
+                               random.uniform(-80.0, 40.0));
         }
         s.sightings->clear();
         add_point_view(cloud, 0.1, *s.sightings);

@@ -48,7 +48,8 @@ TEST(Matching, NamesEveryViewFromNearbyPredictions) {
     for (std::size_t view = 0; view < 4; ++view) {
         std::vector<int> expected(40, -1);
         for (std::size_t i = 0; i < s.views[view].marker.size(); ++i) {
-            if (s.views[view].marker[i] >= 0) expected[static_cast<std::size_t>(s.views[view].marker[i])] = static_cast<int>(i);
+            if (s.views[view].marker[i] >= 0)
+                expected[static_cast<std::size_t>(s.views[view].marker[i])] = static_cast<int>(i);
         }
         for (std::size_t k = 0; k < 40; ++k) {
             if (expected[k] >= 0) {

@@ -17,8 +17,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(Sightings, PointsKeepTheirIndexAndLoseTheHostile) {
     auto set = std::make_unique<SightingSet>();
-    const std::vector<Vec3> points{{1.0, 2.0, 3.0}, {kNan, 0.0, 0.0}, {0.0, kInfinity, 0.0}, {1e38, 0.0, 0.0},
-                                   {0.0, 0.0, -1001.0}, {4.0, 5.0, 6.0}, {5e-324, 0.0, 0.0}};
+    const std::vector<Vec3> points{{1.0, 2.0, 3.0},   {kNan, 0.0, 0.0},    {0.0, kInfinity, 0.0},
+                                   {1e38, 0.0, 0.0},  {0.0, 0.0, -1001.0}, {4.0, 5.0, 6.0},
+                                   {5e-324, 0.0, 0.0}};
     add_point_view(points, 0.5, *set);
     ASSERT_EQ(set->view_count, 1);
     ASSERT_EQ(set->views[0].size(), 3U);
@@ -55,7 +56,8 @@ TEST(Sightings, CameraRaysCarryTheirNoiseInMillimetres) {
     options.camera_count = 2;
     const test::SyntheticFace face(options);
     const CameraModel camera = face.pack().cameras[1];
-    const std::vector<Observation> seen{{100.0F, 200.0F, 8.0F, 0.5F, 0.9F}, {320.0F, 240.0F, 8.0F, 0.5F, 0.9F}};
+    const std::vector<Observation> seen{{100.0F, 200.0F, 8.0F, 0.5F, 0.9F},
+                                        {320.0F, 240.0F, 8.0F, 0.5F, 0.9F}};
     auto set = std::make_unique<SightingSet>();
     add_camera_view(camera, seen, 0.2, 210.0, *set);
     ASSERT_EQ(set->views[0].size(), 2U);
