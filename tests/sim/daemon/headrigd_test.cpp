@@ -24,7 +24,7 @@ extern char** environ;
 namespace rig::test {
 namespace {
 
-class Headrigd : public testing::Test {
+class DaemonProgram : public testing::Test {
   protected:
     // Starts it with its output in files of the folder.
     void start(std::vector<std::string> arguments) {
@@ -69,7 +69,7 @@ class Headrigd : public testing::Test {
     pid_t pid_ = -1;
 };
 
-TEST_F(Headrigd, HelpAndVersionAreNoFailure) {
+TEST_F(DaemonProgram, HelpAndVersionAreNoFailure) {
     EXPECT_EQ(run({"--help"}), 0);
     for (const char* word :
          {"--world", "--pack", "--link", "--executor", "--stream", "--digest", "Exit codes", "Examples"}) {
@@ -79,7 +79,7 @@ TEST_F(Headrigd, HelpAndVersionAreNoFailure) {
     EXPECT_EQ(text("out").rfind("headrigd ", 0), 0U);
 }
 
-TEST_F(Headrigd, MistakesHaveTheirExitCodesAndOneLine) {
+TEST_F(DaemonProgram, MistakesHaveTheirExitCodesAndOneLine) {
     const std::string garbage = folder_ / "garbage";
     std::ofstream(garbage) << "certainly [[ not what is asked for";
     const std::vector<std::pair<int, std::vector<std::string>>> mistakes{
@@ -110,7 +110,7 @@ TEST_F(Headrigd, MistakesHaveTheirExitCodesAndOneLine) {
 }
 
 // SAFE without a pack; heap guard armed; log and digest written; the end of the world is a clean end.
-TEST_F(Headrigd, RunsAWorldToItsEnd) {
+TEST_F(DaemonProgram, RunsAWorldToItsEnd) {
     setenv("RIG_HEAP_GUARD", "abort", 1);
     std::vector<std::string> digests;
     for (int round = 0; round < 2; ++round) {
@@ -138,7 +138,7 @@ TEST_F(Headrigd, RunsAWorldToItsEnd) {
     EXPECT_EQ(digests[0], digests[1]);
 }
 
-TEST_F(Headrigd, RunsInRealTimeWithoutHeapCalls) {
+TEST_F(DaemonProgram, RunsInRealTimeWithoutHeapCalls) {
     setenv("RIG_HEAP_GUARD", "abort", 1);
     FakeWorld world(sim::WorldPace::kRealTime);
     world.perform(60);
@@ -148,7 +148,7 @@ TEST_F(Headrigd, RunsInRealTimeWithoutHeapCalls) {
     EXPECT_NE(text("err").find(" 0 heap calls after seal"), std::string::npos) << text("err");
 }
 
-TEST_F(Headrigd, ASignalEndsItCleanly) {
+TEST_F(DaemonProgram, ASignalEndsItCleanly) {
     for (const auto pace : {sim::WorldPace::kLockstep, sim::WorldPace::kRealTime}) {
         for (const int signal : {SIGTERM, SIGINT}) {
             FakeWorld world(pace);
@@ -166,7 +166,7 @@ TEST_F(Headrigd, ASignalEndsItCleanly) {
     }
 }
 
-TEST_F(Headrigd, AWorldThatHangsUpIsToldByTheExitCode) {
+TEST_F(DaemonProgram, AWorldThatHangsUpIsToldByTheExitCode) {
     FakeWorld world(sim::WorldPace::kLockstep);
     std::thread hangs_up([&] {
         world.accept_and_greet();
@@ -180,7 +180,7 @@ TEST_F(Headrigd, AWorldThatHangsUpIsToldByTheExitCode) {
     EXPECT_NE(text("err").find("closed the connection"), std::string::npos) << text("err");
 }
 
-TEST_F(Headrigd, TheExecutorMustFitTheWorld) {
+TEST_F(DaemonProgram, TheExecutorMustFitTheWorld) {
     FakeWorld world(sim::WorldPace::kLockstep);
     std::thread greeter([&] { world.accept_and_greet(); });
     EXPECT_EQ(run({"--world", world.path(), "--link", "pty:" + line_, "--executor", "threads"}), 2);
