@@ -14,7 +14,8 @@ static_assert(kBlobWindowPx == 64);
 
 using BitRows = std::array<std::uint64_t, kBlobWindowPx>;
 
-// Pixel x of a row is bit x; pixels outside the window do not exist, so callers cut with their window's row mask.
+// Pixel x of a row is bit x; pixels outside the window do not exist, so callers cut with their window's row
+// mask.
 [[nodiscard]] inline std::uint64_t row_mask(int width) {
     return width >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << width) - 1;
 }

@@ -8,24 +8,27 @@ namespace rig {
 
 namespace {
 
-constexpr int kMargin = 8;         // px of surroundings on every side of the component
-constexpr int kFull = 256;         // cover of a pixel that is all blob
-constexpr int kHalf = kFull / 2;   // where the outline is drawn,
-constexpr int kDeep = 176;         // or here where shadow touches the marker
-constexpr int kRamp = 64;          // soft threshold: weight 0 to 1 from outline - kRamp to outline + kRamp
-constexpr double kLeastShare = 0.4;     // of the light at the centre that a pixel's background may have,
+constexpr int kMargin = 8;           // px of surroundings on every side of the component
+constexpr int kFull = 256;           // cover of a pixel that is all blob
+constexpr int kHalf = kFull / 2;     // where the outline is drawn,
+constexpr int kDeep = 176;           // or here where shadow touches the marker
+constexpr int kRamp = 64;            // soft threshold: weight 0 to 1 from outline - kRamp to outline + kRamp
+constexpr double kLeastShare = 0.4;  // of the light at the centre that a pixel's background may have,
 constexpr double kGreatestShare = 2.5;  // so that a bad plane cannot run away
-constexpr int kRedrawReach = 2;    // px that a redrawn outline may lie outside the old one
-constexpr int kMoatReach = 3;      // px
-constexpr int kOpenCover = 112;    // a moat pixel darker than this is no background
-constexpr int kCorePercent = 30;   // of the blob's pixels are darker than its core: clear of noise, glints and edge
+constexpr int kRedrawReach = 2;         // px that a redrawn outline may lie outside the old one
+constexpr int kMoatReach = 3;           // px
+constexpr int kOpenCover = 112;         // a moat pixel darker than this is no background
+constexpr int kCorePercent =
+    30;  // of the blob's pixels are darker than its core: clear of noise, glints and edge
 constexpr double kDeepBadness = 0.25;   // of a marker that only shows at the deep outline
 constexpr double kAspectBadness = 0.3;  // of the flattest disc
-constexpr double kNoiseDeviationPx = 1.0;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
-constexpr double kSureSnr = 6.0;        // contrast / spread of the surroundings: less costs
-constexpr int kMinRing = 12;       // pixels that can carry a plane
-constexpr int kRounds = 2;         // outline -> background -> outline
-constexpr int kFraction = 256;     // of a grey level: fixed point of the background plane
+constexpr double kNoiseDeviationPx =
+    1.5;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
+constexpr double kSureSnr = 6.0;         // contrast / spread of the surroundings: less costs
+constexpr std::uint32_t kPeerAreas = 3;  // a sibling with a third of the blob's area is its equal
+constexpr int kMinRing = 12;             // pixels that can carry a plane
+constexpr int kRounds = 2;               // outline -> background -> outline
+constexpr int kFraction = 256;           // of a grey level: fixed point of the background plane
 
 // Grey level at column x, row y of the window: level + slope_x (x - centre_x) + slope_y (y - centre_y).
 struct Plane {
@@ -84,6 +87,45 @@ void load_window(const ImageView& image, Side side, const Component& component, 
     }
 }
 
+// The blob and its siblings grow towards each other; what the siblings reach first is theirs.
+void claim_foreign(const Component& component, const Siblings& siblings, BlobWorkspace& w) {
+    w.foreign.fill(0);
+    std::uint64_t any = 0;
+    for (const Component& other : siblings.components) {
+        const bool apart = other.right < w.left || other.left >= w.left + w.width || other.bottom < w.top ||
+                           other.top >= w.top + w.height;
+        if (apart || other.area_px * kPeerAreas < component.area_px)
+            continue;  // crumbs of noise claim nothing
+        for (const Run& run : siblings.grouped.subspan(other.first, other.count)) {
+            const int y = run.y - w.top;
+            const int begin = std::max(0, run.begin - w.left);
+            const int end = std::min(w.width, run.end - w.left);
+            if (y < 0 || y >= w.height || begin >= end) continue;
+            w.foreign[static_cast<std::size_t>(y)] |= bit_span(begin, end);
+        }
+    }
+    for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) {
+        w.foreign[y] &= ~w.blob[y];
+        any |= w.foreign[y];
+    }
+    if (any == 0) return;
+    const int steps =
+        (std::max(component.right - component.left, component.bottom - component.top) + 1) / 2 + kMoatReach;
+    const std::uint64_t mask = row_mask(w.width);
+    BitRows own = w.blob;
+    for (int step = 0; step < steps; ++step) {
+        const BitRows theirs = w.foreign;
+        const BitRows ours = own;
+        const auto grow = step % 2 == 0 ? grow_cross : grow_square;  // an octagon: nearly a disc
+        grow(own, w.height);
+        grow(w.foreign, w.height);
+        for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) {
+            own[y] &= ~theirs[y] & mask;
+            w.foreign[y] &= ~(ours[y] | own[y]) & mask;  // a tie is ours: both measure the pixels on the line
+        }
+    }
+}
+
 // Moat: the pixels from one to three steps outside the blob. Ring: from three to five.
 void draw_surroundings(BlobWorkspace& w) {
     const std::uint64_t mask = row_mask(w.width);
@@ -98,7 +140,7 @@ void draw_surroundings(BlobWorkspace& w) {
     grow_square(grown, w.height);
     for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) {
         w.moat[y] = middle[y] & ~inner[y] & mask;
-        w.ring[y] = grown[y] & ~middle[y] & mask;
+        w.ring[y] = grown[y] & ~middle[y] & ~w.foreign[y] & mask;
     }
 }
 
@@ -134,7 +176,8 @@ struct PlaneSums {
     std::int64_t n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, v = 0, xv = 0, yv = 0, vv = 0;
 };
 
-// Over the ring pixels whose grey level is within `below` under and `above` over the guess. Integers: order is free.
+// Over the ring pixels whose grey level is within `below` under and `above` over the guess. Integers: order
+// is free.
 PlaneSums sum_ring(const BlobWorkspace& w, const Plane& guess, double below, double above) {
     const int slope_x = fixed_point(guess.slope_x);
     const int slope_y = fixed_point(guess.slope_y);
@@ -149,9 +192,11 @@ PlaneSums sum_ring(const BlobWorkspace& w, const Plane& guess, double below, dou
             const int px = std::countr_zero(bits);
             const int v = value_at(w, px, py);
             const int x = px - guess.centre_x;
-            const int keep = static_cast<unsigned>(v * kFraction - row_lowest - slope_x * px) <= reach ? 1 : 0;
+            const int keep =
+                static_cast<unsigned>(v * kFraction - row_lowest - slope_x * px) <= reach ? 1 : 0;
             const int kept_v = keep * v;
-            n += keep, sx += keep * x, sxx += keep * x * x, sv += kept_v, sxv += kept_v * x, svv += kept_v * v;
+            n += keep, sx += keep * x, sxx += keep * x * x, sv += kept_v, sxv += kept_v * x,
+                svv += kept_v * v;
         }
         sums.n += n, sums.x += sx, sums.xx += sxx, sums.v += sv, sums.xv += sxv, sums.vv += svv;
         sums.y += std::int64_t{n} * y, sums.xy += std::int64_t{sx} * y, sums.yy += std::int64_t{n} * y * y;
@@ -180,15 +225,16 @@ PlaneFit fit_plane(const BlobWorkspace& w, const Plane& guess, double below, dou
         fit.plane.slope_y = std::clamp((cyv * cxx - cxv * cxy) / determinant, -255.0, 255.0);
     }
     fit.plane.level = (static_cast<double>(s.v) - fit.plane.slope_x * static_cast<double>(s.x) -
-                       fit.plane.slope_y * static_cast<double>(s.y)) / count;
+                       fit.plane.slope_y * static_cast<double>(s.y)) /
+                      count;
     const double rest = cvv - fit.plane.slope_x * cxv - fit.plane.slope_y * cyv;
     fit.rms = rest > 0.0 ? sqrt(rest) / count : 0.0;
     fit.ok = true;
     return fit;
 }
 
-// The skin around the blob as a plane. The first fit takes what is on the skin's side of mid contrast; refits leave
-// out what is clearly part of something else: other markers, shadows, the dark behind the face.
+// The skin around the blob as a plane. The first fit takes what is on the skin's side of mid contrast; refits
+// leave out what is clearly part of something else: other markers, shadows, the dark behind the face.
 PlaneFit first_background(BlobWorkspace& w, const Component& component, int core) {
     Plane guess;
     guess.centre_x = (component.left + component.right) / 2 - w.left;
@@ -230,9 +276,10 @@ Box box_around(const BlobWorkspace& w, int by) {
     return box;
 }
 
-// Cover of every pixel that redrawing and judging can look at, clamped to -1..2 blobs so that 16 bits hold it. Paint
-// scales the light that falls on the skin, so the depth of a whole pixel of blob follows the background's gradient;
-// taking it as constant pulls centres towards the bright side (0.15 px on a shaded forehead).
+// Cover of every pixel that redrawing and judging can look at, clamped to -1..2 blobs so that 16 bits hold
+// it. Paint scales the light that falls on the skin, so the depth of a whole pixel of blob follows the
+// background's gradient; taking it as constant pulls centres towards the bright side (0.15 px on a shaded
+// forehead).
 void compute_cover(BlobWorkspace& w, Side side, const Plane& plane, double depth) {
     const double black = side == Side::kBelow ? 0.0 : 255.0;
     const double light = side == Side::kBelow ? 1.0 : -1.0;
@@ -243,7 +290,8 @@ void compute_cover(BlobWorkspace& w, Side side, const Plane& plane, double depth
     for (int y = box.top; y < box.bottom; ++y) {
         const auto& values = w.values[static_cast<std::size_t>(y)];
         auto& cover = w.cover[static_cast<std::size_t>(y)];
-        const double row_level = plane.level + plane.slope_y * (y - plane.centre_y) - plane.slope_x * plane.centre_x;
+        const double row_level =
+            plane.level + plane.slope_y * (y - plane.centre_y) - plane.slope_x * plane.centre_x;
         for (int x = box.left; x < box.right; ++x) {
             const double level = row_level + plane.slope_x * x;
             const double share = std::clamp((level - black) * to_share, kLeastShare, kGreatestShare);
@@ -259,6 +307,7 @@ void mark_covered(const BlobWorkspace& w, int outline, BitRows& covered) {
     covered = w.blob;
     grow_square(covered, w.height);
     grow_cross(covered, w.height);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) covered[y] &= ~w.foreign[y];
     for (int y = box.top; y < box.bottom; ++y) {
         const auto row = static_cast<std::size_t>(y);
         std::uint64_t bits = 0;
@@ -289,8 +338,8 @@ int largest_piece(BitRows& rest, int height, BitRows& best) {
     return best_count;
 }
 
-// The blob becomes its own outline at `outline` of the contrast: the largest piece, holes filled (glints). False if
-// nothing or less than four fifths of the pixels are in one piece.
+// The blob becomes its own outline at `outline` of the contrast: the largest piece, holes filled (glints).
+// False if nothing or less than four fifths of the pixels are in one piece.
 bool redraw_blob(BlobWorkspace& w, int outline, Rejection& reason) {
     BitRows& covered = w.scratch;
     mark_covered(w, outline, covered);
@@ -309,6 +358,7 @@ Moments soft_moments(BlobWorkspace& w, int outline) {
     BitRows& region = w.scratch;
     region = w.blob;
     grow_square(region, w.height);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) region[y] &= ~w.foreign[y];
     const int low = outline - kRamp;
     const int high = outline + kRamp;
     std::int64_t n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
@@ -336,7 +386,8 @@ Moments soft_moments(BlobWorkspace& w, int outline) {
     return m;
 }
 
-// Mean distance between the outline and the ellipse of equal moments, px: pixels on the wrong side per pixel of outline.
+// Mean distance between the outline and the ellipse of equal moments, px: pixels on the wrong side per pixel
+// of outline.
 double outline_deviation_px(const BlobWorkspace& w, const Moments& m, double mean_radius_px) {
     const double determinant = m.xx * m.yy - m.xy * m.xy;
     if (determinant <= 0.0) return kBlobWindowPx;
@@ -367,7 +418,8 @@ double open_part(const BlobWorkspace& w) {
     return total == 0 ? 1.0 : static_cast<double>(open) / total;
 }
 
-void judge(const BlobWorkspace& w, const Moments& m, const PlaneFit& fit, const BlobLimits& limits, Blob& blob) {
+void judge(const BlobWorkspace& w, const Moments& m, const PlaneFit& fit, const BlobLimits& limits,
+           Blob& blob) {
     const double mean = 0.5 * (m.xx + m.yy);
     const double half = 0.5 * (m.xx - m.yy);
     const double spread = sqrt(half * half + m.xy * m.xy);
@@ -381,10 +433,12 @@ void judge(const BlobWorkspace& w, const Moments& m, const PlaneFit& fit, const 
     blob.open = open_part(w);
     const double aspect = blob.long_axis_px / blob.short_axis_px;
     const double noise = std::max(1.0, fit.rms) / blob.contrast;
-    const double deviation_limit = limits.max_deviation_px + limits.max_deviation * radius + kNoiseDeviationPx * noise;
+    const double deviation_limit =
+        limits.max_deviation_px + limits.max_deviation * radius + kNoiseDeviationPx * noise;
     const double snr = 1.0 / noise;
     blob.badness = blob.deviation / deviation_limit + blob.open / limits.max_open +
-                   kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) + std::max(0.0, kSureSnr - snr) / kSureSnr;
+                   kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) +
+                   std::max(0.0, kSureSnr - snr) / kSureSnr;
     blob.rejection = Rejection::kNone;
     if (blob.diameter_px < limits.min_diameter_px) {
         blob.rejection = Rejection::kSmall;
@@ -411,8 +465,8 @@ bool touches_border(const ImageView& image, const BlobWorkspace& w) {
 }
 
 // Outline -> background -> outline, twice unless the first outline was already right.
-Rejection outline_at_mid_contrast(Side side, const Component& component, const BlobLimits& limits, BlobWorkspace& w, PlaneFit& fit,
-                                  Blob& blob) {
+Rejection outline_at_mid_contrast(Side side, const Component& component, const BlobLimits& limits,
+                                  BlobWorkspace& w, PlaneFit& fit, Blob& blob) {
     int pixels = count_bits(w.blob, w.height);
     for (int round = 0; round < kRounds; ++round) {
         draw_surroundings(w);
@@ -422,7 +476,8 @@ Rejection outline_at_mid_contrast(Side side, const Component& component, const B
         fit = refined_background(w, fit, core);
         blob.background = fit.plane.level;
         blob.contrast = fit.plane.level - core;
-        blob.depth = blob.contrast / std::max(1.0, side == Side::kBelow ? fit.plane.level : 255.0 - fit.plane.level);
+        blob.depth =
+            blob.contrast / std::max(1.0, side == Side::kBelow ? fit.plane.level : 255.0 - fit.plane.level);
         if (blob.contrast < limits.min_contrast) return Rejection::kFaint;
         compute_cover(w, side, fit.plane, blob.contrast);
         Rejection reason = Rejection::kNone;
@@ -452,7 +507,7 @@ void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, c
 }  // namespace
 
 Blob measure_blob(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,
-                  const BlobLimits& limits, BlobWorkspace& w) {
+                  const Siblings& siblings, const BlobLimits& limits, BlobWorkspace& w) {
     Blob blob;
     const int width = component.right - component.left + 1;
     const int height = component.bottom - component.top + 1;
@@ -461,6 +516,7 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
         return blob;
     }
     load_window(image, side, component, runs, w);
+    claim_foreign(component, siblings, w);
     PlaneFit fit;
     blob.rejection = outline_at_mid_contrast(side, component, limits, w, fit, blob);
     if (blob.rejection != Rejection::kNone) return blob;

@@ -1,5 +1,5 @@
-// Measures one blob: its own background plane, its own mid-contrast outline, shape, and a centre that does not depend
-// on the threshold that found it. Not for: finding blobs, or deciding among them.
+// Measures one blob: its own background plane, its own mid-contrast outline, shape, and a centre that does
+// not depend on the threshold that found it. Not for: finding blobs, or deciding among them.
 #pragma once
 
 #include <array>
@@ -17,26 +17,26 @@ namespace rig {
 // Why a blob is no marker. kNone: it may be one.
 enum class Rejection : std::uint8_t {
     kNone = 0,
-    kSmall,       // fewer pixels than the smallest disc, or none at mid contrast
-    kLarge,       // longer than the largest disc
-    kEdge,        // reaches the border of the image: part of it is unseen
-    kFaint,       // too little contrast against its surroundings or the noise
-    kElongated,   // a line, a wrinkle, a disc seen too flat to trust
-    kIrregular,   // outline is no ellipse: merged dots, corners, hair
-    kOpen,        // not surrounded by background: the end or the bend of something larger
-    kSeveral,     // falls into pieces at mid contrast
-    kOddSize,     // much larger or smaller than the other markers of the image
+    kSmall,      // fewer pixels than the smallest disc, or none at mid contrast
+    kLarge,      // longer than the largest disc
+    kEdge,       // reaches the border of the image: part of it is unseen
+    kFaint,      // too little contrast against its surroundings or the noise
+    kElongated,  // a line, a wrinkle, a disc seen too flat to trust
+    kIrregular,  // outline is no ellipse: merged dots, corners, hair
+    kOpen,       // not surrounded by background: the end or the bend of something larger
+    kSeveral,    // falls into pieces at mid contrast
+    kOddSize,    // much larger or smaller than the other markers of the image
     kCount
 };
 
 struct BlobLimits {
-    double min_diameter_px = 3.0;     // of the disc of equal area
-    double max_diameter_px = 28.0;    // long axis
-    double min_contrast = 10.0;       // grey levels
-    double max_aspect = 4.5;          // long axis / short axis
-    double max_deviation_px = 0.12;   // mean distance of the outline from the ellipse of equal moments, plus
-    double max_deviation = 0.03;      // this part of the mean radius
-    double max_open = 0.22;           // part of the moat that is not background
+    double min_diameter_px = 3.0;    // of the disc of equal area
+    double max_diameter_px = 28.0;   // long axis
+    double min_contrast = 10.0;      // grey levels
+    double max_aspect = 4.5;         // long axis / short axis
+    double max_deviation_px = 0.14;  // mean distance of the outline from the ellipse of equal moments, plus
+    double max_deviation = 0.03;     // this part of the mean radius
+    double max_open = 0.22;          // part of the moat that is not background
 };
 
 struct Blob {
@@ -45,23 +45,24 @@ struct Blob {
     double diameter_px = 0.0;   // of the disc of equal area
     double long_axis_px = 0.0;  // diameters of the ellipse of equal moments
     double short_axis_px = 0.0;
-    double contrast = 0.0;      // grey levels between blob and background
-    double background = 0.0;    // grey level at the centre
+    double contrast = 0.0;    // grey levels between blob and background
+    double background = 0.0;  // grey level at the centre
     double deviation = 0.0;
     double open = 0.0;
-    double depth = 0.0;         // contrast / light: the part of the skin's light that the ink takes, or the paint adds
-    double badness = 0.0;       // 0 = a perfect disc; 1 = as far off as any one limit allows
-    double score = 0.0;         // 0..1, from badness and the other blobs of the image
+    double depth =
+        0.0;  // contrast / light: the part of the skin's light that the ink takes, or the paint adds
+    double badness = 0.0;  // 0 = a perfect disc; 1 = as far off as any one limit allows
+    double score = 0.0;    // 0..1, from badness and the other blobs of the image
     Rejection rejection = Rejection::kSmall;
 };
-
-
 
 // Scratch of measure_blob(): a window around the blob, values turned so that the blob is dark.
 struct BlobWorkspace {
     std::array<std::array<std::uint8_t, kBlobWindowPx>, kBlobWindowPx> values{};
-    std::array<std::array<std::int16_t, kBlobWindowPx>, kBlobWindowPx> cover{};  // 0..256: part of a pixel that is blob
+    std::array<std::array<std::int16_t, kBlobWindowPx>, kBlobWindowPx>
+        cover{};  // 0..256: part of a pixel that is blob
     BitRows blob{};
+    BitRows foreign{};  // nearer to another part of the same component
     BitRows moat{};
     BitRows ring{};
     BitRows scratch{};
@@ -72,8 +73,16 @@ struct BlobWorkspace {
     int height = 0;
 };
 
+// What was cut out of the same larger component, the blob itself among it: markers that touch share the
+// pixels between them. Runs of each are in `grouped`. Both empty for a blob that stands alone.
+struct Siblings {
+    std::span<const Component> components;
+    std::span<const Run> grouped;
+};
+
 // `runs` is one component, below (above) some threshold. The centre is in pixels of the image.
 [[nodiscard]] Blob measure_blob(const ImageView& image, Side side, const Component& component,
-                                std::span<const Run> runs, const BlobLimits& limits, BlobWorkspace& workspace);
+                                std::span<const Run> runs, const Siblings& siblings, const BlobLimits& limits,
+                                BlobWorkspace& workspace);
 
 }  // namespace rig

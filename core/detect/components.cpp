@@ -18,7 +18,8 @@ std::uint32_t root_of(std::span<std::uint32_t> parents, std::uint32_t run) {
     return run;
 }
 
-// The smaller number becomes the root, so a component is named by its first run whatever the order of the unions.
+// The smaller number becomes the root, so a component is named by its first run whatever the order of the
+// unions.
 void unite(std::span<std::uint32_t> parents, std::uint32_t a, std::uint32_t b) {
     const std::uint32_t root_a = root_of(parents, a);
     const std::uint32_t root_b = root_of(parents, b);
@@ -40,7 +41,8 @@ void unite_rows(std::span<const Run> runs, std::span<std::uint32_t> parents) {
         }
         if (row_begin == 0 || runs[above].y + 1 != runs[i].y) continue;
         while (above < row_begin && runs[above].end < runs[i].begin) ++above;  // equal touches diagonally
-        for (std::uint32_t k = above; k < row_begin && runs[k].begin <= runs[i].end; ++k) unite(parents, k, i);
+        for (std::uint32_t k = above; k < row_begin && runs[k].begin <= runs[i].end; ++k)
+            unite(parents, k, i);
     }
 }
 
@@ -53,9 +55,11 @@ void widen(Component& component, const Run& run) {
 
 }  // namespace
 
-ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits, const ComponentStorage& storage) {
+ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits,
+                        const ComponentStorage& storage) {
     const std::size_t total = runs.size();
-    RIG_CHECK(storage.parents.size() >= total && storage.areas.size() >= total && storage.grouped.size() >= total);
+    RIG_CHECK(storage.parents.size() >= total && storage.areas.size() >= total &&
+              storage.grouped.size() >= total);
     unite_rows(runs, storage.parents);
     std::fill_n(storage.areas.begin(), total, 0U);
     for (std::uint32_t i = 0; i < total; ++i) {
@@ -64,7 +68,8 @@ ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits
         storage.areas[root] += static_cast<std::uint32_t>(runs[i].end - runs[i].begin);
     }
 
-    // Roots come before their members, so one pass numbers the components; areas[] of a root turns into its number.
+    // Roots come before their members, so one pass numbers the components; areas[] of a root turns into its
+    // number.
     ComponentCounts counts;
     for (std::uint32_t i = 0; i < total; ++i) {
         const std::uint32_t root = storage.parents[i];
@@ -77,7 +82,8 @@ ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits
             storage.areas[i] = kNone;
             if (!small && !full) {
                 storage.areas[i] = static_cast<std::uint32_t>(counts.components);
-                storage.components[counts.components++] = {0, 0, area, runs[i].begin, runs[i].y, 0, runs[i].y};
+                storage.components[counts.components++] = {0,         0, area,     runs[i].begin,
+                                                           runs[i].y, 0, runs[i].y};
             }
         }
         const std::uint32_t number = storage.areas[root];

@@ -38,8 +38,9 @@ struct ComponentCounts {
     std::size_t dropped = 0;  // left out: no room
 };
 
-// Groups `runs` (raster order, not overlapping) into components, numbered by their first run. Components below the
-// least area are counted and left out, so that noise cannot fill the table.
-ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits, const ComponentStorage& storage);
+// Groups `runs` (raster order, not overlapping) into components, numbered by their first run. Components
+// below the least area are counted and left out, so that noise cannot fill the table.
+ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits,
+                        const ComponentStorage& storage);
 
 }  // namespace rig

@@ -11,12 +11,13 @@ namespace rig {
 namespace {
 
 constexpr int kCorePixels = 3;  // beyond one and a half thresholds
-constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5, 0.75};  // of a component's own range of grey
-constexpr double kFringe = 4.0;            // px by which blur and noise lengthen a component
-constexpr double kSizeMargin = 1.6;        // largest marker of an image / usual marker
-constexpr double kSureBadness = 0.7;       // below: good enough to say what the markers of this image are like
+constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
+                                                           0.75};  // of a component's own range of grey
+constexpr double kFringe = 4.0;           // px by which blur and noise lengthen a component
+constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual marker
+constexpr double kSureBadness = 0.7;      // below: good enough to say what the markers of this image are like
 constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
-constexpr double kHopelessBadness = 1.5;   // score 0
+constexpr double kHopelessBadness = 1.5;  // score 0
 
 // The least pixels a disc of the least diameter shows above mid contrast, with a margin for blur.
 std::uint32_t least_area(const BlobLimits& limits) {
@@ -29,7 +30,8 @@ std::span<const Run> members_of(const Component& component, std::span<const Run>
 }
 
 const std::uint8_t* levels_of(const BlockGrid& thresholds, int y) {
-    return &thresholds.values[static_cast<std::size_t>(y) / kBlockPx * static_cast<std::size_t>(thresholds.width)];
+    return &thresholds
+                .values[static_cast<std::size_t>(y) / kBlockPx * static_cast<std::size_t>(thresholds.width)];
 }
 
 // The parts of `runs` for which inside(x, y) holds, as runs.
@@ -66,7 +68,8 @@ void add_reports(DetectorReport& total, const DetectorReport& side) {
     total.blobs_full |= side.blobs_full;
 }
 
-std::size_t cut_at_background(const Detector::Search& search, std::span<const Run> runs, std::span<Run> out, bool& truncated) {
+std::size_t cut_at_background(const Detector::Search& search, std::span<const Run> runs, std::span<Run> out,
+                              bool& truncated) {
     const bool dark = search.side == Side::kBelow;
     return cut(runs, out, truncated, [&](int x, int y) {
         const int value = search.image.row(y)[x];
@@ -75,8 +78,8 @@ std::size_t cut_at_background(const Detector::Search& search, std::span<const Ru
     });
 }
 
-std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span<const Run> runs, std::span<Run> out,
-                         bool& truncated) {
+std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span<const Run> runs,
+                         std::span<Run> out, bool& truncated) {
     const std::uint8_t turn = search.side == Side::kBelow ? 255 : 0;
     int deepest = 0;
     int shallowest = 255;
@@ -95,14 +98,17 @@ std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span
 
 Result<void, DetectorError> Detector::configure(const DetectorConfig& config) {
     const BlobLimits& blob = config.blob;
-    if (!in_range(blob.max_diameter_px, 3.0, kMaxDotDiameterPx) || !in_range(blob.min_diameter_px, 2.0, blob.max_diameter_px)) {
+    if (!in_range(blob.max_diameter_px, 3.0, kMaxDotDiameterPx) ||
+        !in_range(blob.min_diameter_px, 2.0, blob.max_diameter_px)) {
         return failure(DetectorError::kDiameters);
     }
     if (!in_range(blob.min_contrast, 3.0, 128.0) || !in_range(config.relative_contrast, 0.0, 0.9)) {
         return failure(DetectorError::kContrast);
     }
-    if (!in_range(blob.max_aspect, 1.01, 100.0) || !in_range(blob.max_deviation, 0.0, 1.0) || !in_range(blob.max_deviation_px, 0.01, 10.0) ||
-        !in_range(blob.max_open, 0.01, 1.0) || !in_range(config.size_ratio, 1.01, 100.0) || !in_range(config.ink_spread, 0.01, 100.0) || !in_range(config.retro_spread, 0.01, 100.0) || config.size_quorum < 3) {
+    if (!in_range(blob.max_aspect, 1.01, 100.0) || !in_range(blob.max_deviation, 0.0, 1.0) ||
+        !in_range(blob.max_deviation_px, 0.01, 10.0) || !in_range(blob.max_open, 0.01, 1.0) ||
+        !in_range(config.size_ratio, 1.01, 100.0) || !in_range(config.ink_spread, 0.01, 100.0) ||
+        !in_range(config.retro_spread, 0.01, 100.0) || config.size_quorum < 3) {
         return failure(DetectorError::kShape);
     }
     if (!in_range(config.min_score, 0.0, 1.0)) return failure(DetectorError::kScore);
@@ -119,14 +125,16 @@ void Detector::measure_exposure(const ImageView& image, DetectorReport& report) 
     const LumaSums sums = luma_sums(image);
     report.mean_luma = static_cast<double>(sums.sum) / sums.samples;
     report.saturated_fraction = static_cast<double>(sums.saturated) / sums.samples;
-    if (report.mean_luma < config_.dark_luma) report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kDark);
+    if (report.mean_luma < config_.dark_luma)
+        report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kDark);
     if (report.saturated_fraction > config_.saturated_fraction) {
         report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kFlooded);
     }
     if (state_.usual_luma >= 0.0) {
         const double change = report.mean_luma - state_.usual_luma;
         const double allowed = config_.luma_step * std::max(state_.usual_luma, 1.0);
-        if (change > allowed || change < -allowed) report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kStep);
+        if (change > allowed || change < -allowed)
+            report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kStep);
         state_.usual_luma += 0.25 * change;  // a lasting change is the new normal within some ten frames
     } else {
         state_.usual_luma = report.mean_luma;
@@ -134,8 +142,8 @@ void Detector::measure_exposure(const ImageView& image, DetectorReport& report) 
     if (report.exposure != 0) report.faults |= fault_bit(Fault::kExposure);
 }
 
-// The background is what remains when everything narrower than the largest disc is taken away (a closing for dark
-// discs, an opening for bright ones); a pixel is a candidate when it differs from it by a part of it.
+// The background is what remains when everything narrower than the largest disc is taken away (a closing for
+// dark discs, an opening for bright ones); a pixel is a candidate when it differs from it by a part of it.
 void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side,
                               double largest_px) const {
     std::copy(means.values.begin(), means.values.end(), thresholds.values.begin());
@@ -151,7 +159,8 @@ void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& threshold
     }
     for (std::uint8_t& level : thresholds.values) {
         const int step = std::max(least, level * part >> 8);
-        level = static_cast<std::uint8_t>(side == Side::kBelow ? std::max(0, level - step) : std::min(250, level + step));
+        level = static_cast<std::uint8_t>(side == Side::kBelow ? std::max(0, level - step)
+                                                               : std::min(250, level + step));
     }
 }
 
@@ -184,26 +193,28 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     set_thresholds(means, thresholds, side, config_.blob.max_diameter_px);
     const std::size_t count = threshold_runs(image, thresholds, side, w.runs, result.report.runs_full);
     result.report.runs = static_cast<std::uint32_t>(count);
-    const ComponentCounts counts = connect(std::span<const Run>(w.runs).first(count), {least_area(config_.blob)},
-                                           {w.parents, w.areas, w.grouped, w.components});
+    const ComponentCounts counts =
+        connect(std::span<const Run>(w.runs).first(count), {least_area(config_.blob)},
+                {w.parents, w.areas, w.grouped, w.components});
     result.report.blobs_full = counts.dropped > 0;
     const Search search{image, thresholds, side, config_.blob.max_diameter_px};
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& component = w.components[c];
-        if (examine(search, component, members_of(component, w.grouped), result)) continue;
+        if (examine(search, component, members_of(component, w.grouped), {}, result)) continue;
         if (!w.failed.push_back(static_cast<std::uint16_t>(c))) result.report.blobs_full = true;
     }
     split_failed(image, means, side, result);
     apply_population(side, result);
 }
 
-// Blobs that are no markers may hold some: a marker hangs together with a shadow, a strip of light or another marker.
-// Now that the size of the image's markers is known, the background is taken at that scale.
+// Blobs that are no markers may hold some: a marker hangs together with a shadow, a strip of light or another
+// marker. Now that the size of the image's markers is known, the background is taken at that scale.
 void Detector::split_failed(const ImageView& image, const BlockGrid& means, Side side, SideResult& result) {
     Workspace& w = workspace_;
     if (w.failed.empty()) return;
     const double usual = usual_size(result.blobs);
-    const double largest = usual > 0.0 ? std::min(usual * kSizeMargin, config_.blob.max_diameter_px) : config_.blob.max_diameter_px;
+    const double largest = usual > 0.0 ? std::min(usual * kSizeMargin, config_.blob.max_diameter_px)
+                                       : config_.blob.max_diameter_px;
     const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
     set_thresholds(means, thresholds, side, largest);
     const Search search{image, thresholds, side, largest};
@@ -214,7 +225,8 @@ void Detector::split_failed(const ImageView& image, const BlockGrid& means, Side
 }
 
 // True if the blob is done with: a marker, or so faint or small that nothing is inside it either.
-bool Detector::examine(const Search& search, const Component& component, std::span<const Run> runs, SideResult& result) {
+bool Detector::examine(const Search& search, const Component& component, std::span<const Run> runs,
+                       const Siblings& siblings, SideResult& result) {
     const auto reject = [&](Rejection reason) { ++result.report.rejected[static_cast<std::size_t>(reason)]; };
     if (!has_core(search, runs)) {
         reject(Rejection::kFaint);
@@ -225,7 +237,8 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         reject(Rejection::kLarge);
         return false;
     }
-    const Blob blob = measure_blob(search.image, search.side, component, runs, config_.blob, workspace_.blob);
+    const Blob blob =
+        measure_blob(search.image, search.side, component, runs, siblings, config_.blob, workspace_.blob);
     ++result.report.candidates;
     if (blob.rejection != Rejection::kNone) {
         reject(blob.rejection);
@@ -236,22 +249,26 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
 }
 
 // Level 0 cuts at the local background, deeper levels at a part of the component's own range of grey.
-void Detector::split(const Search& search, std::size_t level, const Component& component, std::span<const Run> runs,
-                     SideResult& result) {
+void Detector::split(const Search& search, std::size_t level, const Component& component,
+                     std::span<const Run> runs, SideResult& result) {
     Workspace& w = workspace_;
     SplitStorage& storage = w.split[level];
     bool truncated = false;
-    const std::size_t count = level == 0 ? cut_at_background(search, runs, storage.runs, truncated)
-                                         : cut_at_depth(search, kSplitDepths[level], runs, storage.runs, truncated);
+    const std::size_t count = level == 0
+                                  ? cut_at_background(search, runs, storage.runs, truncated)
+                                  : cut_at_depth(search, kSplitDepths[level], runs, storage.runs, truncated);
     result.report.runs_full |= truncated;
-    const ComponentCounts counts = connect(std::span<const Run>(storage.runs).first(count), {least_area(config_.blob)},
-                                           {w.parents, w.areas, storage.grouped, storage.components});
+    const ComponentCounts counts =
+        connect(std::span<const Run>(storage.runs).first(count), {least_area(config_.blob)},
+                {w.parents, w.areas, storage.grouped, storage.components});
     result.report.blobs_full |= counts.dropped > 0;
+    const Siblings all{std::span<const Component>(storage.components).first(counts.components),
+                       storage.grouped};
     const bool whole = counts.components == 1 && storage.components[0].area_px == component.area_px;
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& part = storage.components[c];
         const std::span<const Run> members = members_of(part, storage.grouped);
-        if (!whole && examine(search, part, members, result)) continue;
+        if (!whole && examine(search, part, members, all, result)) continue;
         if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
     }
 }
@@ -280,8 +297,8 @@ double Detector::usual_depth(const Blobs& blobs) const {
     return static_cast<double>(*middle);
 }
 
-// The markers of one image are of one make: sizes and depths of ink far from the median are eyes, nostrils, teeth,
-// moles or shadows. Without enough sure markers nothing is said.
+// The markers of one image are of one make: sizes and depths of ink far from the median are eyes, nostrils,
+// teeth, moles or shadows. Without enough sure markers nothing is said.
 void Detector::apply_population(Side side, SideResult& result) const {
     const double size = usual_size(result.blobs);
     const double depth = usual_depth(result.blobs);
@@ -289,7 +306,8 @@ void Detector::apply_population(Side side, SideResult& result) const {
     result.quality = 0.0;
     for (Blob& blob : result.blobs) {
         if (size > 0.0) {
-            const double ratio = blob.long_axis_px > size ? blob.long_axis_px / size : size / blob.long_axis_px;
+            const double ratio =
+                blob.long_axis_px > size ? blob.long_axis_px / size : size / blob.long_axis_px;
             blob.badness += std::max(0.0, ratio - 1.0) / (config_.size_ratio - 1.0);
         }
         if (depth > 0.0 && blob.depth < depth) {
@@ -322,15 +340,16 @@ void Detector::hand_on(const SideResult& result, Observations& observations, Det
     float least = 0.0F;
     if (good > kMaxObservations) {
         const auto last = scores.begin() + static_cast<std::ptrdiff_t>(kMaxObservations - 1);
-        std::nth_element(scores.begin(), last, scores.begin() + static_cast<std::ptrdiff_t>(good), [](float a, float b) { return a > b; });
+        std::nth_element(scores.begin(), last, scores.begin() + static_cast<std::ptrdiff_t>(good),
+                         [](float a, float b) { return a > b; });
         least = *last;
     }
     for (const Blob& blob : result.blobs) {
         if (blob.rejection != Rejection::kNone || blob.score < config_.min_score) continue;
         const auto score = static_cast<float>(blob.score);
         const Observation seen{static_cast<float>(blob.x_px), static_cast<float>(blob.y_px),
-                               static_cast<float>(blob.diameter_px), static_cast<float>(std::min(1.0, blob.contrast / 255.0)),
-                               score};
+                               static_cast<float>(blob.diameter_px),
+                               static_cast<float>(std::min(1.0, blob.contrast / 255.0)), score};
         if (score < least || !observations.push_back(seen)) {
             ++report.left_out;
             report.observations_full = true;
@@ -338,7 +357,8 @@ void Detector::hand_on(const SideResult& result, Observations& observations, Det
     }
 }
 
-// Which side the markers are on. Both are tried until the decision has settled, and again when that side fails.
+// Which side the markers are on. Both are tried until the decision has settled, and again when that side
+// fails.
 std::size_t Detector::look(const ImageView& image, const BlockGrid& means, DetectorReport& report) {
     Workspace& w = workspace_;
     const auto try_side = [&](std::size_t index) {

@@ -1,5 +1,6 @@
-// The detection stage: a grey image in, marker observations out. Adaptive threshold against a morphological background,
-// connected runs, and for every blob its own mid-contrast measurement. Not for: names, memory of positions, distortion.
+// The detection stage: a grey image in, marker observations out. Adaptive threshold against a morphological
+// background, connected runs, and for every blob its own mid-contrast measurement. Not for: names, memory of
+// positions, distortion.
 #pragma once
 
 #include <array>
@@ -18,17 +19,18 @@ namespace rig {
 
 struct DetectorConfig {
     MarkerPolarity polarity = MarkerPolarity::kAuto;
-    BlobLimits blob;                    // see there: diameters, contrast, shape
-    double relative_contrast = 0.25;    // of the background, that a pixel needs to belong to a candidate
-    double min_score = 0.15;            // 0..1, below which a blob is not handed on
-    double size_ratio = 1.75;           // long axis against the median of the image: one unit of badness
-    double ink_spread = 0.6;            // part of the median depth that a dark marker may lack: one unit of badness;
-    double retro_spread = 1.2;          // of a bright one, whose return falls with the angle
-    std::uint16_t size_quorum = 8;      // markers needed before that median says anything
-    double dark_luma = 4.0;             // mean grey level below which the image is called dark (F13)
-    double saturated_fraction = 0.25;   // of 255s, above which it is called flooded (F13)
-    double luma_step = 0.4;             // change of the mean, relative to the usual, that is called a step (F13)
-    std::uint8_t polarity_frames = 8;   // equal decisions before automatic polarity stops looking at both sides
+    BlobLimits blob;                  // see there: diameters, contrast, shape
+    double relative_contrast = 0.25;  // of the background, that a pixel needs to belong to a candidate
+    double min_score = 0.15;          // 0..1, below which a blob is not handed on
+    double size_ratio = 1.75;         // long axis against the median of the image: one unit of badness
+    double ink_spread = 0.6;    // part of the median depth that a dark marker may lack: one unit of badness;
+    double retro_spread = 1.2;  // of a bright one, whose return falls with the angle
+    std::uint16_t size_quorum = 8;     // markers needed before that median says anything
+    double dark_luma = 4.0;            // mean grey level below which the image is called dark (F13)
+    double saturated_fraction = 0.25;  // of 255s, above which it is called flooded (F13)
+    double luma_step = 0.4;  // change of the mean, relative to the usual, that is called a step (F13)
+    std::uint8_t polarity_frames =
+        8;  // equal decisions before automatic polarity stops looking at both sides
 };
 
 enum class DetectorError : std::uint8_t { kDiameters, kContrast, kShape, kScore, kExposure };
@@ -37,26 +39,26 @@ enum class ExposureFlag : std::uint8_t { kDark = 1, kFlooded = 2, kStep = 4 };
 
 struct DetectorReport {
     std::uint32_t runs = 0;
-    std::uint32_t candidates = 0;                                                   // blobs measured
+    std::uint32_t candidates = 0;                                                       // blobs measured
     std::array<std::uint32_t, static_cast<std::size_t>(Rejection::kCount)> rejected{};  // by Rejection
     std::uint32_t low_score = 0;
-    std::uint32_t left_out = 0;         // good blobs beyond kMaxObservations, the lowest scored
-    bool runs_full = false;             // a capacity was reached: runs, blobs, observations
+    std::uint32_t left_out = 0;  // good blobs beyond kMaxObservations, the lowest scored
+    bool runs_full = false;      // a capacity was reached: runs, blobs, observations
     bool blobs_full = false;
     bool observations_full = false;
-    bool unprocessable = false;         // no image, or larger than the limits
+    bool unprocessable = false;                       // no image, or larger than the limits
     MarkerPolarity polarity = MarkerPolarity::kDark;  // the side the observations come from
-    double mean_luma = 0.0;             // grey levels
+    double mean_luma = 0.0;                           // grey levels
     double saturated_fraction = 0.0;
-    std::uint8_t exposure = 0;          // ExposureFlag bits
-    FaultMap faults = 0;                // kExposure, kBlobCapacity
+    std::uint8_t exposure = 0;  // ExposureFlag bits
+    FaultMap faults = 0;        // kExposure, kBlobCapacity
 };
 
 // How often a blob that is no marker is cut again.
 inline constexpr std::size_t kSplitLevels = 3;
 
-// One camera's detector. Memory is fixed (about 4 MB); detect() never allocates and never fails: hard data give few
-// observations and a report. Observations are in raster order of their first pixel.
+// One camera's detector. Memory is fixed (about 4 MB); detect() never allocates and never fails: hard data
+// give few observations and a report. Observations are in raster order of their first pixel.
 class Detector {
   public:
     // Validates once. On failure the detector keeps its previous configuration.
@@ -113,13 +115,14 @@ class Detector {
     };
 
     void measure_exposure(const ImageView& image, DetectorReport& report);
-    void set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side, double largest_px) const;
+    void set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side,
+                        double largest_px) const;
     void detect_side(const ImageView& image, const BlockGrid& means, Side side, SideResult& result);
     void split_failed(const ImageView& image, const BlockGrid& means, Side side, SideResult& result);
     void split(const Search& search, std::size_t level, const Component& component, std::span<const Run> runs,
                SideResult& result);
     [[nodiscard]] bool examine(const Search& search, const Component& component, std::span<const Run> runs,
-                               SideResult& result);
+                               const Siblings& siblings, SideResult& result);
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
     [[nodiscard]] double usual_size(const Blobs& blobs) const;
     [[nodiscard]] double usual_depth(const Blobs& blobs) const;

@@ -13,7 +13,8 @@ namespace {
 
 constexpr int kBlock = static_cast<int>(kBlockPx);
 constexpr int kMaxRadius = 32;
-constexpr std::size_t kMaxGridSide = (kMaxImageWidth > kMaxImageHeight ? kMaxImageWidth : kMaxImageHeight) / kBlockPx;
+constexpr std::size_t kMaxGridSide =
+    (kMaxImageWidth > kMaxImageHeight ? kMaxImageWidth : kMaxImageHeight) / kBlockPx;
 
 static_assert(kBlockPx == 4, "the block sums below are written for four pixels");
 
@@ -91,11 +92,13 @@ void slide_strip(const BlockGrid& grid, std::size_t left, std::size_t radius, St
     const std::size_t length = 2 * radius + 1;
     std::size_t span = 1;
     for (; span * 2 <= length; span *= 2) {
-        for (std::size_t i = 0; i < (total - span) * kStrip; ++i) strip[i] = Op::of(strip[i], strip[i + span * kStrip]);
+        for (std::size_t i = 0; i < (total - span) * kStrip; ++i)
+            strip[i] = Op::of(strip[i], strip[i + span * kStrip]);
     }
     const std::size_t shift = (length - span) * kStrip;
     for (std::size_t i = 0; i < height * kStrip; ++i) strip[i] = Op::of(strip[i], strip[i + shift]);
-    for (std::size_t y = 0; y < height; ++y) std::memcpy(&grid.values[y * width + left], &strip[y * kStrip], columns);
+    for (std::size_t y = 0; y < height; ++y)
+        std::memcpy(&grid.values[y * width + left], &strip[y * kStrip], columns);
 }
 
 template <class Op>
@@ -112,11 +115,13 @@ void slide(const BlockGrid& grid, int radius) {
     for (std::size_t left = 0; left < width; left += kStrip) slide_strip<Op>(grid, left, reach, strip);
 }
 
-void mark_below(const std::uint8_t* pixels, const std::uint8_t* thresholds, std::size_t width, std::uint8_t* mask) {
+void mark_below(const std::uint8_t* pixels, const std::uint8_t* thresholds, std::size_t width,
+                std::uint8_t* mask) {
     for (std::size_t x = 0; x < width; ++x) mask[x] = pixels[x] < thresholds[x] ? 255 : 0;
 }
 
-void mark_above(const std::uint8_t* pixels, const std::uint8_t* thresholds, std::size_t width, std::uint8_t* mask) {
+void mark_above(const std::uint8_t* pixels, const std::uint8_t* thresholds, std::size_t width,
+                std::uint8_t* mask) {
     for (std::size_t x = 0; x < width; ++x) mask[x] = pixels[x] > thresholds[x] ? 255 : 0;
 }
 
@@ -141,7 +146,8 @@ std::size_t scan_row(const std::uint8_t* mask, std::size_t width, int y, Run* ru
             if (open == 0) {
                 begin = at;
             } else {
-                runs[count++] = {static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(at)};
+                runs[count++] = {static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(begin),
+                                 static_cast<std::uint16_t>(at)};
             }
             open ^= 1U;
         }
@@ -170,7 +176,8 @@ BlockGrid block_means(const ImageView& image, std::span<std::uint8_t> storage) {
         std::size_t done = 0;
         if (full_height) {
             add_rows(image, by * kBlock, sums);
-            for (; done < whole; ++done) out[done] = static_cast<std::uint8_t>((four(&sums[4 * done]) + 8) >> 4);
+            for (; done < whole; ++done)
+                out[done] = static_cast<std::uint8_t>((four(&sums[4 * done]) + 8) >> 4);
         }
         for (; done < width; ++done) out[done] = edge_block_mean(image, static_cast<int>(done), by);
     }
@@ -202,10 +209,11 @@ void sliding_min(const BlockGrid& grid, int radius) {
     slide<Min>(grid, radius);
 }
 
-std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, Side side, std::span<Run> runs,
-                           bool& truncated) {
+std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, Side side,
+                           std::span<Run> runs, bool& truncated) {
     RIG_CHECK(is_processable(image));
-    RIG_CHECK(thresholds.width == blocks_across(image.width_px) && thresholds.height == blocks_across(image.height_px));
+    RIG_CHECK(thresholds.width == blocks_across(image.width_px) &&
+              thresholds.height == blocks_across(image.height_px));
     truncated = false;
     const auto width = static_cast<std::size_t>(image.width_px);
     const auto blocks = static_cast<std::size_t>(thresholds.width);

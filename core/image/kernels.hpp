@@ -1,5 +1,6 @@
-// Pixel kernels: block means, sliding extremes, thresholding into horizontal runs. Integers only, plain loops that a
-// compiler turns into vector code; the same bytes at any optimisation level. Not for: deciding what a marker is.
+// Pixel kernels: block means, sliding extremes, thresholding into horizontal runs. Integers only, plain loops
+// that a compiler turns into vector code; the same bytes at any optimisation level. Not for: deciding what a
+// marker is.
 #pragma once
 
 #include <cstddef>
@@ -51,8 +52,8 @@ void sliding_min(const BlockGrid& grid, int radius);
 
 enum class Side : std::uint8_t { kBelow, kAbove };
 
-// Runs of pixels strictly below (above) the threshold of their block, in raster order. Returns how many were written;
-// stops at the end of a row that might not fit and then sets `truncated`.
+// Runs of pixels strictly below (above) the threshold of their block, in raster order. Returns how many were
+// written; stops at the end of a row that might not fit and then sets `truncated`.
 [[nodiscard]] std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, Side side,
                                          std::span<Run> runs, bool& truncated);
 

@@ -8,8 +8,8 @@
 
 namespace rig {
 
-// Pixel (x, y) is pixels[y * stride_bytes + x]; integer coordinates are pixel centres; origin at the top left.
-// Owner and lifetime are the caller's; a view with pixels == nullptr means "no image".
+// Pixel (x, y) is pixels[y * stride_bytes + x]; integer coordinates are pixel centres; origin at the top
+// left. Owner and lifetime are the caller's; a view with pixels == nullptr means "no image".
 struct ImageView {
     const std::uint8_t* pixels = nullptr;
     int width_px = 0;

@@ -117,7 +117,9 @@ void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& rep
         state.cameras[c] = c < pack_.camera_count && configured_ ? CameraStatus::kMissing : CameraStatus::kUnused;
     }
     sightings_.clear();
+    named_ = NamedMarkers{};  // a tick without pictures has no markers, not the last ones
     named_.capture_us = capture_us;
+    named_.count = configured_ ? pack_.marker_count : std::uint16_t{0};
 }
 
 void Pipeline::take_observations(std::size_t camera, std::span<const Observation> observations, FrameReport& report) {

@@ -13,6 +13,14 @@
 
 namespace rig {
 
+namespace {
+
+constexpr int kLook_ms = 5;
+constexpr int kCloseLooks = 60;  // 0.3 s
+constexpr int kEmptyLooks = 3;
+
+}  // namespace
+
 Result<void, LinkError> PtyLink::open() {
     close();
     if (!open_pair() || (!symlink_path_.empty() && !publish_symlink())) {
@@ -72,7 +80,25 @@ bool PtyLink::owns_symlink() const {
     return length.done() && std::strcmp(target.data(), slave_path_.data()) == 0;
 }
 
+// Closing the master throws away what the reader has not taken yet: a hang-up empties its buffer. So a reader
+// that is there gets a moment to take the last bytes.
+void PtyLink::let_reader_finish() {
+    if (!master_.is_open() || slave_path_[0] == '\0' || !slave_is_open()) return;
+    const os::SystemResult opened = os::system_call(
+        [&] { return ::open(slave_path_.data(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC); });
+    if (!opened.done()) return;
+    const os::Descriptor slave(static_cast<int>(opened.value));
+    int empty_looks = 0;
+    for (int look = 0; look < kCloseLooks && empty_looks < kEmptyLooks; ++look) {
+        // The kernel moves bytes between two buffers on the way, and only the second is counted: one look may
+        // be wrong.
+        empty_looks = os::unread_bytes(slave.get()) == 0 ? empty_looks + 1 : 0;
+        static_cast<void>(os::system_call([] { return poll(nullptr, 0, kLook_ms); }));
+    }
+}
+
 void PtyLink::close() {
+    let_reader_finish();
     if (owns_symlink()) static_cast<void>(os::system_call([&] { return unlink(symlink_path_.c_str()); }));
     master_.reset();
     slave_path_ = {};

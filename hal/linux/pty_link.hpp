@@ -22,7 +22,8 @@ class PtyLink final : public ByteLink {
     PtyLink(const PtyLink&) = delete;
     PtyLink& operator=(const PtyLink&) = delete;
     [[nodiscard]] Result<void, LinkError> open() override;
-    // Removes the symlink if it is still this link's.
+    // Gives a reader that is there up to 0.3 s to take what was written: closing would destroy it. Then
+    // removes the symlink if it is still this link's.
     void close() override;
     [[nodiscard]] Result<std::size_t, LinkError> write(ByteSpan bytes) override;
     [[nodiscard]] Result<std::size_t, LinkError> read(MutableByteSpan into) override;
@@ -32,6 +33,7 @@ class PtyLink final : public ByteLink {
 
   private:
     [[nodiscard]] bool slave_is_open();
+    void let_reader_finish();
     [[nodiscard]] bool open_pair();
     [[nodiscard]] bool discard_leftovers() const;
     [[nodiscard]] bool publish_symlink() const;

@@ -31,4 +31,9 @@ bool discard_input(int descriptor) {
     return system_call([&] { return ioctl(descriptor, TCFLSH, TCIFLUSH); }).done();
 }
 
+int unread_bytes(int descriptor) {
+    int count = 0;
+    return system_call([&] { return ioctl(descriptor, FIONREAD, &count); }).done() ? count : 0;
+}
+
 }  // namespace rig::os

@@ -12,4 +12,7 @@ inline constexpr int kKeepRate = 0;
 // Drops what was received and not yet read. False when the device refuses.
 [[nodiscard]] bool discard_input(int descriptor);
 
+// Received and not yet read; 0 when the device does not say.
+[[nodiscard]] int unread_bytes(int descriptor);
+
 }  // namespace rig::os

@@ -38,7 +38,8 @@ std::filesystem::path overlay_path(const DetectOptions& options, const std::stri
 Result<void, FileError> write_overlay(const std::filesystem::path& path, const GreyImage& image,
                                       const Observations& observations) {
     constexpr int kZoom = 2;
-    const cv::Mat grey(image.height_px, image.width_px, CV_8UC1, const_cast<std::uint8_t*>(image.pixels.data()));
+    const cv::Mat grey(image.height_px, image.width_px, CV_8UC1,
+                       const_cast<std::uint8_t*>(image.pixels.data()));
     cv::Mat picture;
     cv::resize(grey, picture, {}, kZoom, kZoom, cv::INTER_NEAREST);
     cv::cvtColor(picture, picture, cv::COLOR_GRAY2RGB);
@@ -46,8 +47,10 @@ Result<void, FileError> write_overlay(const std::filesystem::path& path, const G
     const auto fixed = [](double px) { return cvRound(((px + 0.5) * kZoom - 0.5) * (1 << kShift)); };
     for (const Observation& seen : observations) {
         const cv::Point centre(fixed(static_cast<double>(seen.x_px)), fixed(static_cast<double>(seen.y_px)));
-        const int radius = cvRound((0.5 * static_cast<double>(seen.diameter_px) + 2.0) * kZoom * (1 << kShift));
-        const cv::Scalar colour(255.0 * (1.0 - static_cast<double>(seen.score)), 255.0 * static_cast<double>(seen.score), 64.0);
+        const int radius =
+            cvRound((0.5 * static_cast<double>(seen.diameter_px) + 2.0) * kZoom * (1 << kShift));
+        const cv::Scalar colour(255.0 * (1.0 - static_cast<double>(seen.score)),
+                                255.0 * static_cast<double>(seen.score), 64.0);
         cv::circle(picture, centre, radius, colour, 1, cv::LINE_AA, kShift);
         cv::circle(picture, centre, 1 << kShift, {255, 64, 64}, cv::FILLED, cv::LINE_AA, kShift);
     }
@@ -57,8 +60,8 @@ Result<void, FileError> write_overlay(const std::filesystem::path& path, const G
 
 void print_observations(const std::string& stem, const Observations& observations) {
     for (const Observation& seen : observations) {
-        fmt::print("{},{:.4f},{:.4f},{:.3f},{:.4f},{:.3f}\n", stem, seen.x_px, seen.y_px, seen.diameter_px, seen.contrast,
-                   seen.score);
+        fmt::print("{},{:.4f},{:.4f},{:.3f},{:.4f},{:.3f}\n", stem, seen.x_px, seen.y_px, seen.diameter_px,
+                   seen.contrast, seen.score);
     }
 }
 
@@ -66,13 +69,15 @@ void print_report(const std::string& stem, const DetectorReport& report) {
     using enum Rejection;
     const auto count = [&](Rejection reason) { return report.rejected[static_cast<std::size_t>(reason)]; };
     fmt::print(stderr,
-               "{}: {} polarity, mean {:.1f}, saturated {:.1f} %, {} runs, {} candidates; rejected: {} small, {} large, "
-               "{} at the edge, {} faint, {} elongated, {} irregular, {} open, {} in pieces, {} of odd size, {} low score; "
+               "{}: {} polarity, mean {:.1f}, saturated {:.1f} %, {} runs, {} candidates; rejected: {} "
+               "small, {} large, "
+               "{} at the edge, {} faint, {} elongated, {} irregular, {} open, {} in pieces, {} of odd size, "
+               "{} low score; "
                "{} left out\n",
                stem, report.polarity == MarkerPolarity::kDark ? "dark" : "bright", report.mean_luma,
-               100.0 * report.saturated_fraction, report.runs, report.candidates, count(kSmall), count(kLarge), count(kEdge),
-               count(kFaint), count(kElongated), count(kIrregular), count(kOpen), count(kSeveral), count(kOddSize),
-               report.low_score, report.left_out);
+               100.0 * report.saturated_fraction, report.runs, report.candidates, count(kSmall),
+               count(kLarge), count(kEdge), count(kFaint), count(kElongated), count(kIrregular), count(kOpen),
+               count(kSeveral), count(kOddSize), report.low_score, report.left_out);
 }
 
 int run_detect(const DetectOptions& options) {
@@ -82,8 +87,8 @@ int run_detect(const DetectOptions& options) {
     config.blob.max_diameter_px = options.max_diameter_px;
     const auto detector = std::make_unique<Detector>();
     if (!detector->configure(config)) {
-        print_error(fmt::format("diameters {} to {} px: want 2 <= least <= greatest <= {}", options.min_diameter_px,
-                                options.max_diameter_px, kMaxDotDiameterPx));
+        print_error(fmt::format("diameters {} to {} px: want 2 <= least <= greatest <= {}",
+                                options.min_diameter_px, options.max_diameter_px, kMaxDotDiameterPx));
         return kExitUsage;
     }
     const auto observations = std::make_unique<Observations>();
@@ -102,15 +107,16 @@ int run_detect(const DetectOptions& options) {
         detector->reset();  // every image stands for itself
         detector->detect(image->view(), *observations, report);
         if (report.unprocessable) {
-            print_error(fmt::format("{}: {} x {} px, more than {} x {}: make it smaller", path.string(), image->width_px,
-                                    image->height_px, kMaxImageWidth, kMaxImageHeight));
+            print_error(fmt::format("{}: {} x {} px, more than {} x {}: make it smaller", path.string(),
+                                    image->width_px, image->height_px, kMaxImageWidth, kMaxImageHeight));
             exit_code = kExitInput;
             continue;
         }
         print_observations(path.stem().string(), *observations);
         if (options.report) print_report(path.stem().string(), report);
         if (!options.overlay.empty()) {
-            const auto written = write_overlay(overlay_path(options, path.stem().string()), *image, *observations);
+            const auto written =
+                write_overlay(overlay_path(options, path.stem().string()), *image, *observations);
             if (!written) {
                 print_error(written.error().message);
                 return kExitOutput;
@@ -127,9 +133,11 @@ void add_detect_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<DetectOptions>();
     CLI::App* verb = app.add_subcommand("detect", "find the markers in images; CSV on standard output");
     verb->add_option("images", options->images, "PGM, PNG or JPEG files")->required()->type_name("IMAGE");
-    const std::map<std::string, MarkerPolarity> names = {
-        {"auto", MarkerPolarity::kAuto}, {"dark", MarkerPolarity::kDark}, {"bright", MarkerPolarity::kBright}};
-    verb->add_option("--polarity", options->polarity, "markers darker or brighter than the skin: dark, bright or auto")
+    const std::map<std::string, MarkerPolarity> names = {{"auto", MarkerPolarity::kAuto},
+                                                         {"dark", MarkerPolarity::kDark},
+                                                         {"bright", MarkerPolarity::kBright}};
+    verb->add_option("--polarity", options->polarity,
+                     "markers darker or brighter than the skin: dark, bright or auto")
         ->transform(CLI::CheckedTransformer(names, CLI::ignore_case).description(""))
         ->type_name("SIDE")
         ->default_str("auto");
@@ -139,11 +147,14 @@ void add_detect_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--max-diameter", options->max_diameter_px, "greatest diameter of a marker, px")
         ->capture_default_str()
         ->type_name("PX");
-    verb->add_option("--overlay", options->overlay, "picture with the markers circled; several images: name_<image>.png")
+    verb->add_option("--overlay", options->overlay,
+                     "picture with the markers circled; several images: name_<image>.png")
         ->type_name("PNG");
-    verb->add_flag("--report", options->report, "what was looked at and why it was rejected, on standard error");
+    verb->add_flag("--report", options->report,
+                   "what was looked at and why it was rejected, on standard error");
     verb->footer(
-        "Columns: image (file name without ending), x_px, y_px (integers are pixel centres), diameter_px, contrast "
+        "Columns: image (file name without ending), x_px, y_px (integers are pixel centres), diameter_px, "
+        "contrast "
         "(0..1), score (0..1).\nExamples:\n  headrig detect take/*.png > dots.csv\n"
         "  headrig detect frame.pgm --polarity bright --overlay frame_dots.png");
     verb->callback([options, &exit_code] {

@@ -12,9 +12,9 @@ namespace {
 constexpr double kOwnPlaceMm = 2.0;
 
 double squared_distance_mm2(const Vec3d& truth, const std::array<float, 3>& measured) {
-    const double dx = truth.x - static_cast<double>(measured[0]);
-    const double dy = truth.y - static_cast<double>(measured[1]);
-    const double dz = truth.z - static_cast<double>(measured[2]);
+    const double dx = truth[0] - static_cast<double>(measured[0]);
+    const double dy = truth[1] - static_cast<double>(measured[1]);
+    const double dz = truth[2] - static_cast<double>(measured[2]);
     return dx * dx + dy * dy + dz * dz;
 }
 

@@ -19,6 +19,8 @@
 #include "firmware_host/companion/links/link_spec.hpp"
 #include "firmware_host/companion/train/camera_file.hpp"
 #include "firmware_host/companion/train/pack_writer.hpp"
+#include "firmware_host/companion/replay/replay_log.hpp"
+#include "firmware_host/take_log/stream_digest.hpp"
 #include "firmware_host/pack_file/opened_pack.hpp"
 
 namespace rig::host {
@@ -122,16 +124,16 @@ Result<OpenedPack, FileError> make_pack(const DemoOptions& options, const Stage&
 // What arrives at the host, frame by frame of the world.
 class Reception {
   public:
-    Reception(const Stage& stage, const HandOver& hand_over, bool real_time)
+    Reception(const Stage& stage, const HandOver& hand_over, const ServerCounters& served, bool real_time)
         : accuracy(*stage.world, stage.model),
           world_(*stage.world),
           hand_over_(hand_over),
+          served_(served),
           real_time_(real_time),
           states_(stage.world->frame_count()),
           have_(stage.world->frame_count(), false) {}
 
     void take_state(const ReceivedState& received) {
-        if (!first_us_) first_us_ = received.state.capture_us;
         const auto frame = frame_of(received.state.sequence, received.state.capture_us);
         if (!frame || have_[*frame]) return;
         have_[*frame] = true;
@@ -153,6 +155,13 @@ class Reception {
     [[nodiscard]] std::int64_t last_received_us() const { return last_received_us_; }
     [[nodiscard]] const std::vector<FaceState>& states() const { return states_; }
     [[nodiscard]] bool has(std::size_t frame) const { return have_[frame]; }
+    [[nodiscard]] std::uint64_t digest() const {
+        StreamDigest digest;
+        for (std::size_t f = 0; f < states_.size(); ++f) {
+            if (have_[f]) digest.add(states_[f]);
+        }
+        return digest.value();
+    }
     [[nodiscard]] LatencyFigures latency() {
         LatencyFigures figures;
         if (latencies_ms_.empty()) return figures;
@@ -174,7 +183,7 @@ class Reception {
     std::optional<std::size_t> frame_of(std::uint32_t sequence, std::int64_t capture_us) const {
         std::size_t frame = sequence;
         if (real_time_) {
-            const double since_s = static_cast<double>(capture_us - first_us_.value_or(capture_us)) * 1e-6;
+            const double since_s = static_cast<double>(capture_us - served_.start_us) * 1e-6;
             frame = static_cast<std::size_t>(std::llround(std::max(0.0, since_s) * world_.config().rate_hz));
         }
         if (frame >= world_.frame_count()) return std::nullopt;
@@ -183,13 +192,13 @@ class Reception {
 
     const World& world_;
     const HandOver& hand_over_;
+    const ServerCounters& served_;
     bool real_time_;
     std::vector<FaceState> states_;
     std::vector<bool> have_;
     std::vector<double> latencies_ms_;
     std::uint64_t received_ = 0;
     std::int64_t last_received_us_ = 0;
-    std::optional<std::int64_t> first_us_;
 };
 
 Result<ChildProcess, FileError> start_daemon(const DemoOptions& options, const std::filesystem::path& socket,
@@ -200,6 +209,8 @@ Result<ChildProcess, FileError> start_daemon(const DemoOptions& options, const s
                                              "--pack", (options.out_folder / "face.pack").string(),
                                              "--link", "pty:" + line.string(),
                                              "--stream", "weights,markers,status",
+                                             "--log-observations", (options.out_folder / "take.rgo").string(),
+                                             "--digest",
                                              "--executor", options.real_time ? "threads" : "lockstep"};
     return ChildProcess::start(arguments, options.out_folder / "headrigd.log");
 }
@@ -368,6 +379,7 @@ std::vector<std::string> broken_bounds(const DemoFigures& figures, const DemoBou
           fmt::format("{} of {} received frames have a solve behind them", a.frames_judged, figures.received));
     if (real_time) return broken;
     check(figures.lost == 0, fmt::format("{} frames lost", figures.lost));
+    check(figures.digest == figures.replayed_digest, "the observation log solves to other weights than were received");
     check(figures.bad_wire == 0, fmt::format("{} wire frames refused", figures.bad_wire));
     return broken;
 }
@@ -399,7 +411,7 @@ Result<DemoFigures, FileError> run_demo(const DemoOptions& options, const DemoEv
     auto link = open_line(options, line, *daemon);
     if (!link) return failure(link.error());
 
-    Reception reception(*stage, hand_over, options.real_time);
+    Reception reception(*stage, hand_over, server.counters(), options.real_time);
     Health health;
     SessionOptions wanted;
     wanted.streams = kStreamWeights | kStreamMarkers | kStreamStatus;
@@ -426,6 +438,12 @@ Result<DemoFigures, FileError> run_demo(const DemoOptions& options, const DemoEv
         return failure(daemon_fault(options, end ? fmt::format("ended with code {}", end->exit_code) : "does not end"));
     }
     if (served != ServerEnd::kCompleted) return failure(daemon_fault(options, "left the world before its end"));
+    events.step("solving the recorded observations again");
+    const auto replayed = replay_log({options.out_folder / "take.rgo", (options.out_folder / "face.pack").string(), false},
+                                     *pack, [](const FaceState&, double) { return true; });
+    if (!replayed) return failure(replayed.error());
+    figures.digest = reception.digest();
+    figures.replayed_digest = replayed->digest;
     events.step("drawing the pictures");
     if (const auto written = write_outputs(options, *stage, pack->pack(), reception, figures); !written) {
         return failure(written.error());

@@ -53,6 +53,8 @@ struct DemoFigures {
     double solve_p50_ms = 0.0;        // images in hand to state, on the daemon
     double solve_p99_ms = 0.0;
     double solve_max_ms = 0.0;
+    std::uint64_t digest = 0;           // of the states as received
+    std::uint64_t replayed_digest = 0;  // of the observation log solved again here
 };
 
 // Accuracy and losses, never times. From the issue that asked for the demo.
@@ -72,7 +74,8 @@ struct DemoEvents {
     std::function<bool()> interrupted;
 };
 
-// Writes into out_folder: face.pack, cameras.json, weights.csv, overlay.png, curves.png, headrigd.log.
+// Writes into out_folder: face.pack, cameras.json, take.rgo, weights.csv, overlay.png, curves.png,
+// headrigd.log.
 [[nodiscard]] Result<DemoFigures, FileError> run_demo(const DemoOptions& options, const DemoEvents& events);
 
 }  // namespace rig::host

@@ -4,10 +4,17 @@
 
 namespace rig::host {
 
-FramesAhead::FramesAhead(const World& world, std::span<std::uint8_t> images, std::size_t stride, std::size_t slot_count,
-                         std::size_t threads, TruthRecorder* truth, std::function<void()> rendered)
-    : world_(world), images_(images), stride_(stride), truth_(truth), rendered_(std::move(rendered)), slots_(slot_count) {
-    for (std::size_t t = 0; t < std::max<std::size_t>(threads, 1); ++t) threads_.emplace_back([this] { work(); });
+FramesAhead::FramesAhead(const World& world, std::span<std::uint8_t> images, std::size_t stride,
+                         std::size_t slot_count, std::size_t threads, TruthRecorder* truth,
+                         std::function<void()> rendered)
+    : world_(world),
+      images_(images),
+      stride_(stride),
+      truth_(truth),
+      rendered_(std::move(rendered)),
+      slots_(slot_count) {
+    for (std::size_t t = 0; t < std::max<std::size_t>(threads, 1); ++t)
+        threads_.emplace_back([this] { work(); });
 }
 
 FramesAhead::~FramesAhead() {
@@ -81,7 +88,8 @@ bool FramesAhead::give_up(std::size_t frame) {
 
 FramesAhead::Slot* FramesAhead::claim() {
     if (next_ >= allowed_) return nullptr;
-    const auto free = std::find_if(slots_.begin(), slots_.end(), [](const Slot& slot) { return slot.use == Use::kFree; });
+    const auto free =
+        std::find_if(slots_.begin(), slots_.end(), [](const Slot& slot) { return slot.use == Use::kFree; });
     if (free == slots_.end()) return nullptr;
     *free = {Use::kRendering, next_++, false};
     return &*free;
@@ -98,7 +106,8 @@ void FramesAhead::work() {
             continue;
         }
         const std::size_t frame = slot->frame;
-        for (std::size_t camera = 0; camera < controls.size(); ++camera) controls[camera] = control_locked(frame, camera);
+        for (std::size_t camera = 0; camera < controls.size(); ++camera)
+            controls[camera] = control_locked(frame, camera);
         lock.unlock();
         draw(renderer, static_cast<std::size_t>(slot - slots_.data()), frame, controls);
         lock.lock();

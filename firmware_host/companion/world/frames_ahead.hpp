@@ -1,5 +1,5 @@
-// Renders frames in order into a ring of slots, a few ahead of the one that is sent. Which bytes a frame has depends on
-// its number and its controls alone, never on the number of threads or on timing.
+// Renders frames in order into a ring of slots, a few ahead of the one that is sent. Which bytes a frame has
+// depends on its number and its controls alone, never on the number of threads or on timing.
 #pragma once
 
 #include <condition_variable>
@@ -18,10 +18,11 @@ namespace rig::host {
 
 class FramesAhead {
   public:
-    // Image of camera c in slot s: images[(s * camera_count + c) * stride]. `rendered` is called from a rendering thread
-    // after each frame. truth may be null.
-    FramesAhead(const World& world, std::span<std::uint8_t> images, std::size_t stride, std::size_t slot_count,
-                std::size_t threads, TruthRecorder* truth, std::function<void()> rendered);
+    // Image of camera c in slot s: images[(s * camera_count + c) * stride]. `rendered` is called from a
+    // rendering thread after each frame. truth may be null.
+    FramesAhead(const World& world, std::span<std::uint8_t> images, std::size_t stride,
+                std::size_t slot_count, std::size_t threads, TruthRecorder* truth,
+                std::function<void()> rendered);
     ~FramesAhead();
     FramesAhead(const FramesAhead&) = delete;
     FramesAhead& operator=(const FramesAhead&) = delete;
@@ -54,7 +55,8 @@ class FramesAhead {
 
     void work();
     [[nodiscard]] Slot* claim();
-    void draw(WorldRenderer& renderer, std::size_t slot, std::size_t frame, std::span<const CameraControl> controls);
+    void draw(WorldRenderer& renderer, std::size_t slot, std::size_t frame,
+              std::span<const CameraControl> controls);
     [[nodiscard]] CameraControl control_locked(std::size_t frame, std::size_t camera) const;
 
     const World& world_;

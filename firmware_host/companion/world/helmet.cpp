@@ -24,8 +24,8 @@ HelmetCamera aimed(const std::string& name, const Vec3d& centre_mm, const Vec3d&
     const Vec3d forward = normalised(target_mm - centre_mm);
     const Vec3d down = normalised(Vec3d{0, -1, 0} - dot(Vec3d{0, -1, 0}, forward) * forward);
     const Vec3d right = cross(down, forward);
-    camera.rotation = {right[0],   right[1],   right[2],   down[0],   down[1],
-                       down[2],    forward[0], forward[1], forward[2]};
+    camera.rotation = {right[0], right[1],   right[2],   down[0],   down[1],
+                       down[2],  forward[0], forward[1], forward[2]};
     return camera;
 }
 
@@ -71,11 +71,11 @@ HelmetCamera parsed(const Json& entry) {
 std::string fault_of(const HelmetCamera& camera) {
     if (camera.width_px < 16 || camera.width_px > static_cast<int>(kMaxImageWidth) || camera.height_px < 16 ||
         camera.height_px > static_cast<int>(kMaxImageHeight)) {
-        return fmt::format("size {}x{} is outside 16x16 to {}x{}", camera.width_px, camera.height_px, kMaxImageWidth,
-                           kMaxImageHeight);
+        return fmt::format("size {}x{} is outside 16x16 to {}x{}", camera.width_px, camera.height_px,
+                           kMaxImageWidth, kMaxImageHeight);
     }
-    for (const double value : {camera.f_px, camera.cx_px, camera.cy_px, camera.k1, camera.k2, camera.centre_mm[0],
-                               camera.centre_mm[1], camera.centre_mm[2]}) {
+    for (const double value : {camera.f_px, camera.cx_px, camera.cy_px, camera.k1, camera.k2,
+                               camera.centre_mm[0], camera.centre_mm[1], camera.centre_mm[2]}) {
         if (!(std::abs(value) < kLongestFocal_px)) return "a number is not finite or absurdly large";
     }
     if (!(camera.f_px > 1.0)) return "f_px must be above 1";
@@ -126,10 +126,11 @@ std::vector<HelmetCamera> default_helmet(std::size_t camera_count) {
         if (camera_count >= 4) cameras.push_back(aimed("d", {0.0, 30.0, 228.0}, target));
     }
     // No two lenses are alike; the spread is that of the reference images' single lens.
-    constexpr std::array<std::array<double, 5>, kMaxCameras> kLenses = {{{598.4, 242.7, 317.4, -0.110, 0.018},
-                                                                        {601.7, 236.9, 321.8, -0.104, 0.015},
-                                                                        {599.1, 240.8, 323.6, -0.113, 0.020},
-                                                                        {602.6, 238.2, 316.1, -0.107, 0.017}}};
+    constexpr std::array<std::array<double, 5>, kMaxCameras> kLenses = {
+        {{598.4, 242.7, 317.4, -0.110, 0.018},
+         {601.7, 236.9, 321.8, -0.104, 0.015},
+         {599.1, 240.8, 323.6, -0.113, 0.020},
+         {602.6, 238.2, 316.1, -0.107, 0.017}}};
     for (std::size_t c = 0; c < cameras.size(); ++c) {
         const auto& [f, cx, cy, k1, k2] = kLenses[c];
         cameras[c].f_px = f;
@@ -148,8 +149,9 @@ Result<std::vector<HelmetCamera>, FileError> load_helmet(const std::filesystem::
     try {
         const Json document = Json::parse(file);
         if (!document.is_object() || !document.contains("cameras")) {
-            return failure(FileError{fmt::format(
-                "{}: has no \"cameras\" array; `headrig world --calibration FILE` writes one", path.string())});
+            return failure(FileError{
+                fmt::format("{}: has no \"cameras\" array; `headrig world --calibration FILE` writes one",
+                            path.string())});
         }
         for (const Json& entry : document.at("cameras")) cameras.push_back(parsed(entry));
     } catch (const Json::exception& error) {
@@ -161,7 +163,8 @@ Result<std::vector<HelmetCamera>, FileError> load_helmet(const std::filesystem::
     }
     for (const HelmetCamera& camera : cameras) {
         if (const std::string fault = fault_of(camera); !fault.empty()) {
-            return failure(FileError{fmt::format("{}: camera \"{}\": {}", path.string(), camera.name, fault)});
+            return failure(
+                FileError{fmt::format("{}: camera \"{}\": {}", path.string(), camera.name, fault)});
         }
         if (camera.width_px != cameras[0].width_px || camera.height_px != cameras[0].height_px) {
             return failure(FileError{fmt::format("{}: cameras differ in image size", path.string())});
@@ -170,24 +173,26 @@ Result<std::vector<HelmetCamera>, FileError> load_helmet(const std::filesystem::
     return cameras;
 }
 
-Result<void, FileError> save_helmet(const std::filesystem::path& path, const std::vector<HelmetCamera>& cameras,
-                                    double dot_radius_mm, const std::string& layout) {
+Result<void, FileError> save_helmet(const std::filesystem::path& path,
+                                    const std::vector<HelmetCamera>& cameras, double dot_radius_mm,
+                                    const std::string& layout) {
     return save_helmet(path, cameras, dot_radius_mm, layout, {});
 }
 
-Result<void, FileError> save_helmet(const std::filesystem::path& path, const std::vector<HelmetCamera>& cameras,
-                                    double dot_radius_mm, const std::string& layout,
-                                    const std::vector<ImageRecord>& images) {
+Result<void, FileError> save_helmet(const std::filesystem::path& path,
+                                    const std::vector<HelmetCamera>& cameras, double dot_radius_mm,
+                                    const std::string& layout, const std::vector<ImageRecord>& images) {
     Json document = cameras.empty() ? Json::object() : lens(cameras[0]);
     document["model"] =
-        "p=(X,Y)/Z in camera axes (x right, y down, z forward), r2=|p|^2, p_d=p(1+k1 r2+k2 r2^2), px=f*p_d+c; "
+        "p=(X,Y)/Z in camera axes (x right, y down, z forward), r2=|p|^2, p_d=p(1+k1 r2+k2 r2^2), "
+        "px=f*p_d+c; "
         "integer px = pixel centre, origin top-left";
     document["camera"] = "X_cam = R (X_head - centre); in \"cameras\" the head is where it is without slip";
     document["dot_radius_mm"] = dot_radius_mm;
-    document["layout"] = layout.find_first_not_of("0123456789") == std::string::npos && !layout.empty() &&
-                                 layout.size() < 9
-                             ? Json(std::stoi(layout))
-                             : Json(layout);
+    document["layout"] =
+        layout.find_first_not_of("0123456789") == std::string::npos && !layout.empty() && layout.size() < 9
+            ? Json(std::stoi(layout))
+            : Json(layout);
     document["cameras"] = Json::array();
     for (const HelmetCamera& camera : cameras) {
         Json entry{{"camera", camera.name}};

@@ -35,29 +35,30 @@ struct PixelAt {
 
 [[nodiscard]] PixelAt see(const HelmetCamera& camera, const Vec3d& headset_mm);
 
-// Undistorted (X/Z, Y/Z) of a pixel. NaN where the distortion formula does not reach, i.e. beyond the radius at which
-// it folds back.
+// Undistorted (X/Z, Y/Z) of a pixel. NaN where the distortion formula does not reach, i.e. beyond the radius
+// at which it folds back.
 struct RaySlope {
     double x = 0.0;
     double y = 0.0;
 };
 [[nodiscard]] RaySlope slope_of_pixel(const HelmetCamera& camera, double x_px, double y_px);
 
-// 1: one camera straight ahead; 2: left and right, baseline 90 mm; 3: and one below; 4: and one above. All are 480x640
-// (the sensor stands upright), about 200 mm from the cheeks, each with its own lens, aimed between nose and lips.
+// 1: one camera straight ahead; 2: left and right, baseline 90 mm; 3: and one below; 4: and one above. All
+// are 480x640 (the sensor stands upright), about 200 mm from the cheeks, each with its own lens, aimed
+// between nose and lips.
 [[nodiscard]] std::vector<HelmetCamera> default_helmet(std::size_t camera_count);
 
-// The "cameras" array of a cameras.json. Refuses: not JSON, no such array, more than kMaxCameras, sizes of cameras that
-// differ, numbers that are absent, not finite or out of range, R that is no rotation.
+// The "cameras" array of a cameras.json. Refuses: not JSON, no such array, more than kMaxCameras, sizes of
+// cameras that differ, numbers that are absent, not finite or out of range, R that is no rotation.
 [[nodiscard]] Result<std::vector<HelmetCamera>, FileError> load_helmet(const std::filesystem::path& path);
 
 // cameras.json without images: what training and the daemon may know about the helmet.
 [[nodiscard]] Result<void, FileError> save_helmet(const std::filesystem::path& path,
-                                                  const std::vector<HelmetCamera>& cameras, double dot_radius_mm,
-                                                  const std::string& layout);
+                                                  const std::vector<HelmetCamera>& cameras,
+                                                  double dot_radius_mm, const std::string& layout);
 
-// One entry of the "images" array. `rotation` and `centre_mm` are the camera in the frame of the head itself, slip
-// included: X_cam = R (X_head - centre).
+// One entry of the "images" array. `rotation` and `centre_mm` are the camera in the frame of the head itself,
+// slip included: X_cam = R (X_head - centre).
 struct ImageRecord {
     std::string image;
     std::size_t frame = 0;
@@ -67,7 +68,8 @@ struct ImageRecord {
     Vec3d centre_mm{};
 };
 [[nodiscard]] Result<void, FileError> save_helmet(const std::filesystem::path& path,
-                                                  const std::vector<HelmetCamera>& cameras, double dot_radius_mm,
-                                                  const std::string& layout, const std::vector<ImageRecord>& images);
+                                                  const std::vector<HelmetCamera>& cameras,
+                                                  double dot_radius_mm, const std::string& layout,
+                                                  const std::vector<ImageRecord>& images);
 
 }  // namespace rig::host

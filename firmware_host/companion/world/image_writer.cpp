@@ -27,7 +27,9 @@ struct Run {
     bool stop = false;
     std::string fault{};
 
-    [[nodiscard]] std::size_t count() const { return (world.frame_count() + options.step - 1) / options.step; }
+    [[nodiscard]] std::size_t count() const {
+        return (world.frame_count() + options.step - 1) / options.step;
+    }
 };
 
 std::string stem(const World& world, std::size_t frame, std::size_t camera) {
@@ -64,8 +66,8 @@ void draw_frames(Run& run) {
 }
 
 Result<void, FileError> save_truth(const Run& run) {
-    CsvWriter table({"image", "marker", "name", "x_px", "y_px", "dot_cx_px", "dot_cy_px", "visible", "dot_area_px",
-                     "cos_view", "X_mm", "Y_mm", "Z_mm"});
+    CsvWriter table({"image", "marker", "name", "x_px", "y_px", "dot_cx_px", "dot_cy_px", "visible",
+                     "dot_area_px", "cos_view", "X_mm", "Y_mm", "Z_mm"});
     const std::size_t markers = run.world.marker_count();
     for (std::size_t i = 0; i < run.sights.size(); ++i) {
         const std::size_t frame = i * run.options.step;
@@ -115,8 +117,8 @@ Result<std::size_t, FileError> write_world_images(const World& world, const std:
     if (!run.fault.empty()) return failure(FileError{run.fault});
     const std::vector<ImageRecord> images = records(run);
     if (auto saved = save_truth(run); !saved) return failure(saved.error());
-    if (auto saved = save_helmet(folder / "cameras.json", world.cameras(), world.config().dot_radius_mm, options.layout,
-                                 images);
+    if (auto saved = save_helmet(folder / "cameras.json", world.cameras(), world.config().dot_radius_mm,
+                                 options.layout, images);
         !saved) {
         return failure(saved.error());
     }

@@ -27,7 +27,8 @@ struct Skin {
 };
 
 // Diffuse light with a soft terminator, and a glint (Blinn, power 24).
-RIG_WIDE_LOOPS void add_lamp(const PlacedLamp& lamp, const std::array<float, 3>& eye, const Skin& skin, float* __restrict__ light) {
+RIG_WIDE_LOOPS void add_lamp(const PlacedLamp& lamp, const std::array<float, 3>& eye, const Skin& skin,
+                             float* __restrict__ light) {
     const float wrap_scale = 1.0F / (1.0F + lamp.wrap);
     for (std::size_t v = 0; v < skin.count; ++v) {
         const float dx = lamp.x - skin.x[v], dy = lamp.y - skin.y[v], dz = lamp.z - skin.z[v];
@@ -44,7 +45,8 @@ RIG_WIDE_LOOPS void add_lamp(const PlacedLamp& lamp, const std::array<float, 3>&
         const float h2 = (along > 0.0F ? along * along : 0.0F) / (hx * hx + hy * hy + hz * hz + 1e-6F);
         const float h4 = h2 * h2, h8 = h4 * h4, h16 = h8 * h8;
         const float diffuse = facing > 0.0F ? facing : 0.0F;
-        light[v] += lamp.power * inverse * inverse * (skin.albedo[v] + 0.35F * skin.gloss[v] * h16 * h8) * diffuse;
+        light[v] +=
+            lamp.power * inverse * inverse * (skin.albedo[v] + 0.35F * skin.gloss[v] * h16 * h8) * diffuse;
     }
 }
 
@@ -78,7 +80,8 @@ void light_vertices(const Lighting& lighting, const HelmetCamera& camera, const 
         return multiply(back, multiply(camera.rotation, headset_mm - camera.centre_mm) - view.offset_mm);
     };
     const Vec3d eye_mm = to_face(camera.centre_mm);
-    const std::array<float, 3> eye = {static_cast<float>(eye_mm[0]), static_cast<float>(eye_mm[1]), static_cast<float>(eye_mm[2])};
+    const std::array<float, 3> eye = {static_cast<float>(eye_mm[0]), static_cast<float>(eye_mm[1]),
+                                      static_cast<float>(eye_mm[2])};
     const Skin skin{posed.position_mm.x.data(), posed.position_mm.y.data(), posed.position_mm.z.data(),
                     posed.normal.x.data(),      posed.normal.y.data(),      posed.normal.z.data(),
                     face.albedo().data(),       face.gloss().data(),        count};
@@ -89,9 +92,10 @@ void light_vertices(const Lighting& lighting, const HelmetCamera& camera, const 
     for (std::size_t v = 0; v < count; ++v) light[v] = ambient * albedo[v];
     for (const Lamp& lamp : lighting.lamps) {
         const Vec3d place = to_face(lamp.position_mm);
-        add_lamp({static_cast<float>(place[0]), static_cast<float>(place[1]), static_cast<float>(place[2]),
-                  static_cast<float>(lamp.power * kReference_mm * kReference_mm), static_cast<float>(lamp.wrap)},
-                 eye, skin, light);
+        add_lamp(
+            {static_cast<float>(place[0]), static_cast<float>(place[1]), static_cast<float>(place[2]),
+             static_cast<float>(lamp.power * kReference_mm * kReference_mm), static_cast<float>(lamp.wrap)},
+            eye, skin, light);
     }
     for (std::size_t v = 0; v < count; ++v) light[v] *= kDeepest + (1.0F - kDeepest) * open[v];
 }

@@ -10,17 +10,20 @@ namespace rig::host {
 
 namespace {
 
-// Skin farther from a dot than this is not listed with it: more than a pixel's footprint on skin seen at a slant.
+// Skin farther from a dot than this is not listed with it: more than a pixel's footprint on skin seen at a
+// slant.
 constexpr double kDotMargin_mm = 1.0;
 
 Vec3d at(const VertexArrays& arrays, std::int32_t vertex) {
     const auto i = static_cast<std::size_t>(vertex);
-    return {static_cast<double>(arrays.x[i]), static_cast<double>(arrays.y[i]), static_cast<double>(arrays.z[i])};
+    return {static_cast<double>(arrays.x[i]), static_cast<double>(arrays.y[i]),
+            static_cast<double>(arrays.z[i])};
 }
 
 Vec3d blend(const VertexArrays& arrays, const Int3& vertices, const Float3& barycentric) {
     Vec3d sum{};
-    for (std::size_t k = 0; k < 3; ++k) sum = sum + static_cast<double>(barycentric[k]) * at(arrays, vertices[k]);
+    for (std::size_t k = 0; k < 3; ++k)
+        sum = sum + static_cast<double>(barycentric[k]) * at(arrays, vertices[k]);
     return sum;
 }
 
@@ -32,12 +35,14 @@ double distance_to_segment(const Vec3d& p, const Vec3d& a, const Vec3d& b) {
 }
 
 double distance_to_triangle(const Vec3d& p, const Vec3d& a, const Vec3d& b, const Vec3d& c) {
-    const double edge = std::min({distance_to_segment(p, a, b), distance_to_segment(p, b, c), distance_to_segment(p, c, a)});
+    const double edge =
+        std::min({distance_to_segment(p, a, b), distance_to_segment(p, b, c), distance_to_segment(p, c, a)});
     const Vec3d normal = cross(b - a, c - a);
     const double square = dot(normal, normal);
     if (!(square > 0.0)) return edge;
     const Vec3d foot = p - (dot(p - a, normal) / square) * normal;
-    const bool inside = dot(cross(b - a, foot - a), normal) >= 0.0 && dot(cross(c - b, foot - b), normal) >= 0.0 &&
+    const bool inside = dot(cross(b - a, foot - a), normal) >= 0.0 &&
+                        dot(cross(c - b, foot - b), normal) >= 0.0 &&
                         dot(cross(a - c, foot - c), normal) >= 0.0;
     return inside ? length(p - foot) : edge;
 }
@@ -57,7 +62,8 @@ bool winds_clockwise(const Rig& rig, const MarkerLayout& layout) {
     double agreement = 0.0;
     for (const Int3& t : rig.triangles) {
         for (const LayoutMarker& marker : layout.markers) {
-            if (t[0] != marker.vertices[0] && t[1] != marker.vertices[0] && t[2] != marker.vertices[0]) continue;
+            if (t[0] != marker.vertices[0] && t[1] != marker.vertices[0] && t[2] != marker.vertices[0])
+                continue;
             const auto corner = [&](std::size_t k) {
                 const Float3& v = rig.vertices_mm[static_cast<std::size_t>(t[k])];
                 return Vec3d{static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
@@ -83,7 +89,8 @@ PaintedFace::PaintedFace(const Rig& rig, const MarkerLayout& layout, double dot_
     order_triangles(rig, layout);
     pack_shapes(rig);
     for (const LayoutMarker& marker : layout.markers) {
-        dots_.push_back({blend(rest_, marker.vertices, marker.barycentric), marker.vertices, marker.barycentric});
+        dots_.push_back(
+            {blend(rest_, marker.vertices, marker.barycentric), marker.vertices, marker.barycentric});
     }
     marker_basis_.assign(dots_.size() * shape_count(), Vec3d{});
     for (std::size_t s = 0; s < shape_count(); ++s) {
@@ -114,7 +121,8 @@ PaintedFace::PaintedFace(const Rig& rig, const MarkerLayout& layout, double dot_
 
 void PaintedFace::order_triangles(const Rig& rig, const MarkerLayout& layout) {
     std::vector<bool> skin_vertex(vertex_count(), false);
-    for (const LayoutMarker& marker : layout.markers) skin_vertex[static_cast<std::size_t>(marker.vertices[0])] = true;
+    for (const LayoutMarker& marker : layout.markers)
+        skin_vertex[static_cast<std::size_t>(marker.vertices[0])] = true;
     std::vector<bool> skin_part(256, false);
     for (std::size_t t = 0; t < rig.triangles.size(); ++t) {
         for (const std::int32_t v : rig.triangles[t]) {
@@ -134,6 +142,7 @@ void PaintedFace::order_triangles(const Rig& rig, const MarkerLayout& layout) {
             if (clockwise) std::swap(triangle[1], triangle[2]);
             triangles_.push_back(triangle);
         }
+        if (skin) skin_triangle_count_ = triangles_.size();
     }
 }
 
@@ -159,7 +168,8 @@ void PaintedFace::place_dots(const MarkerLayout& layout) {
     }
     std::vector<std::vector<std::uint16_t>> lists(triangles_.size());
     for (std::size_t m = 0; m < dots_.size(); ++m) {
-        std::deque<std::int32_t> frontier(layout.markers[m].vertices.begin(), layout.markers[m].vertices.end());
+        std::deque<std::int32_t> frontier(layout.markers[m].vertices.begin(),
+                                          layout.markers[m].vertices.end());
         while (!frontier.empty()) {
             const std::int32_t vertex = frontier.front();
             frontier.pop_front();

@@ -13,7 +13,8 @@ namespace {
 
 // Smaller triangles, in square px, are edge-on or degenerate.
 constexpr float kSmallestArea_px2 = 1e-4F;
-// Barycentric slack: neighbours round their shared edge differently, and a gap there would show what lies behind.
+// Barycentric slack: neighbours round their shared edge differently, and a gap there would show what lies
+// behind.
 constexpr float kEdgeSlack = -2e-5F;
 
 struct Bounds {
@@ -33,14 +34,16 @@ RIG_INLINE float most(float a, float b, float c) {
     return ab > c ? ab : c;
 }
 
-// Conversion to int cuts the fraction off; what that rounds outwards by too much costs a pixel's test and no more.
+// Conversion to int cuts the fraction off; what that rounds outwards by too much costs a pixel's test and no
+// more.
 RIG_INLINE int clamped(float value, int limit) {
     const auto end = static_cast<float>(limit);
     const float low = value > 0.0F ? value : 0.0F;
     return static_cast<int>(low < end ? low : end);
 }
 
-RIG_INLINE Bounds bounds_of(int width_px, int height_px, const SeenVertices& seen, const std::array<std::size_t, 3>& v) {
+RIG_INLINE Bounds bounds_of(int width_px, int height_px, const SeenVertices& seen,
+                            const std::array<std::size_t, 3>& v) {
     const float* column = seen.column.data();
     const float* row = seen.row.data();
     const float left = least(column[v[0]], column[v[1]], column[v[2]]);
@@ -84,7 +87,8 @@ RIG_INLINE void draw(const TrianglePlane& plane, std::uint32_t index, const Boun
             const Floats c = plane.cx * dx + plane.cy * dy;
             const Floats nearness = plane.iz + plane.iz_b * b + plane.iz_c * c;
             const Floats old = floats(group.inverse_depth);
-            const Masks wins = (b >= kEdgeSlack) & (c >= kEdgeSlack) & (b + c <= 1.0F - kEdgeSlack) & (nearness > old);
+            const Masks wins =
+                (b >= kEdgeSlack) & (c >= kEdgeSlack) & (b + c <= 1.0F - kEdgeSlack) & (nearness > old);
             if (!any(wins)) continue;
             Masks owner;
             std::memcpy(&owner, group.plane.data(), sizeof(owner));
@@ -94,6 +98,41 @@ RIG_INLINE void draw(const TrianglePlane& plane, std::uint32_t index, const Boun
             std::memcpy(group.plane.data(), &owner, sizeof(owner));
         }
     }
+}
+
+constexpr int kTile_px = 8;
+static_assert(kTile_px % kWide == 0);
+
+int tiles_across(const PixelGrid& grid) {
+    return (grid.width_px() + kTile_px - 1) / kTile_px;
+}
+
+// The part of a tile beyond the image is never covered, so tiles at the rim hide nothing unless they are
+// whole.
+void measure_cover(const PixelGrid& grid, std::vector<float>& cover) {
+    const int across = tiles_across(grid);
+    const int down = (grid.height_px() + kTile_px - 1) / kTile_px;
+    cover.assign(static_cast<std::size_t>(across) * static_cast<std::size_t>(down),
+                 std::numeric_limits<float>::max());
+    for (int y = 0; y < grid.height_px(); ++y) {
+        float* tiles =
+            cover.data() + static_cast<std::size_t>(y / kTile_px) * static_cast<std::size_t>(across);
+        const PixelGroup* groups = grid.row(y);
+        for (int x = 0; x < grid.width_px(); x += kWide) {
+            float& tile = tiles[x / kTile_px];
+            for (const float nearness : groups[x / kWide].inverse_depth)
+                tile = nearness < tile ? nearness : tile;
+        }
+    }
+}
+
+RIG_INLINE bool is_covered(const Bounds& box, float nearest, int across, const std::vector<float>& cover) {
+    for (int y = box.first_row / kTile_px; y <= (box.end_row - 1) / kTile_px; ++y) {
+        for (int x = box.first_column / kTile_px; x <= (box.end_column - 1) / kTile_px; ++x) {
+            if (cover[static_cast<std::size_t>(y * across + x)] < nearest) return false;
+        }
+    }
+    return true;
 }
 
 }  // namespace
@@ -124,7 +163,8 @@ void PixelGrid::clear() {
     }
 }
 
-RIG_WIDE_LOOPS void project(const HelmetCamera& camera, const FaceView& view, const VertexArrays& position_mm, SeenVertices& seen) {
+RIG_WIDE_LOOPS void project(const HelmetCamera& camera, const FaceView& view, const VertexArrays& position_mm,
+                            SeenVertices& seen) {
     const std::size_t count = position_mm.x.size();
     for (auto* array : {&seen.x, &seen.y, &seen.inverse_depth, &seen.column, &seen.row, &seen.light}) {
         array->resize(count);
@@ -164,7 +204,8 @@ RIG_WIDE_LOOPS void project(const HelmetCamera& camera, const FaceView& view, co
     }
 }
 
-RIG_WIDE_LOOPS void rasterise(std::span<const Int3> triangles, const SeenVertices& seen, PixelGrid& grid, SeenSurface& surface) {
+RIG_WIDE_LOOPS void rasterise(std::span<const Int3> triangles, std::size_t front_count,
+                              const SeenVertices& seen, PixelGrid& grid, SeenSurface& surface) {
     grid.clear();
     surface.planes.clear();
     surface.triangle.clear();
@@ -172,7 +213,9 @@ RIG_WIDE_LOOPS void rasterise(std::span<const Int3> triangles, const SeenVertice
     surface.first_row = grid.height_px();
     surface.end_column = 0;
     surface.end_row = 0;
+    const int across = tiles_across(grid);
     for (std::size_t t = 0; t < triangles.size(); ++t) {
+        if (t == front_count) measure_cover(grid, surface.cover);
         const std::array<std::size_t, 3> v = {static_cast<std::size_t>(triangles[t][0]),
                                               static_cast<std::size_t>(triangles[t][1]),
                                               static_cast<std::size_t>(triangles[t][2])};
@@ -181,14 +224,25 @@ RIG_WIDE_LOOPS void rasterise(std::span<const Int3> triangles, const SeenVertice
         const float area = ux * wy - wx * uy;
         // Counter-clockwise seen from outside is negative where y points down.
         if (!(area < -kSmallestArea_px2)) continue;
-        const float ia = seen.inverse_depth[v[0]], ib = seen.inverse_depth[v[1]], ic = seen.inverse_depth[v[2]];
+        const float ia = seen.inverse_depth[v[0]], ib = seen.inverse_depth[v[1]],
+                    ic = seen.inverse_depth[v[2]];
         if (ia <= 0.0F || ib <= 0.0F || ic <= 0.0F) continue;
         const Bounds box = bounds_of(grid.width_px(), grid.height_px(), seen, v);
         if (box.first_column >= box.end_column || box.first_row >= box.end_row) continue;
+        if (t >= front_count && is_covered(box, most(ia, ib, ic), across, surface.cover)) continue;
         const float scale = 1.0F / area;
         const float light = seen.light[v[0]];
-        const TrianglePlane plane{seen.x[v[0]], seen.y[v[0]], wy * scale, -wx * scale, -uy * scale, ux * scale, ia,
-                                  ib - ia,      ic - ia,      light,      seen.light[v[1]] - light,
+        const TrianglePlane plane{seen.x[v[0]],
+                                  seen.y[v[0]],
+                                  wy * scale,
+                                  -wx * scale,
+                                  -uy * scale,
+                                  ux * scale,
+                                  ia,
+                                  ib - ia,
+                                  ic - ia,
+                                  light,
+                                  seen.light[v[1]] - light,
                                   seen.light[v[2]] - light};
         draw(plane, static_cast<std::uint32_t>(surface.planes.size()), box, grid);
         surface.planes.push_back(plane);

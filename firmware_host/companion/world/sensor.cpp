@@ -42,12 +42,14 @@ void fill_normal(std::uint64_t seed, std::span<const float> quantiles, std::span
             state[lane] = s;
         }
         const std::size_t here = std::min(kLanes, row.size() - x);
-        for (std::size_t lane = 0; lane < here; ++lane) row[x + lane] = quantiles[state[lane] >> (32 - kQuantileBits)];
+        for (std::size_t lane = 0; lane < here; ++lane)
+            row[x + lane] = quantiles[state[lane] >> (32 - kQuantileBits)];
     }
 }
 
 // out[x] = k0 in[x] + sum over k of taps[k] (in[x - k step] + in[x + k step])
-RIG_WIDE_LOOPS void convolve(const float* in, std::size_t step, std::span<const float> taps, std::size_t count, float* __restrict__ out) {
+RIG_WIDE_LOOPS void convolve(const float* in, std::size_t step, std::span<const float> taps,
+                             std::size_t count, float* __restrict__ out) {
     for (std::size_t x = 0; x < count; ++x) out[x] = taps[0] * in[x];
     for (std::size_t k = 1; k < taps.size(); ++k) {
         const float tap = taps[k];
@@ -63,11 +65,12 @@ struct Amplifier {
     float read;   // variance
 };
 
-RIG_WIDE_LOOPS void digitise(const Amplifier& amplifier, const float* light, const float* shade, const float* normal, std::size_t count,
-                             std::uint8_t* __restrict__ out) {
+RIG_WIDE_LOOPS void digitise(const Amplifier& amplifier, const float* light, const float* shade,
+                             const float* normal, std::size_t count, std::uint8_t* __restrict__ out) {
     for (std::size_t x = 0; x < count; ++x) {
         const float signal = light[x] * shade[x] * amplifier.scale;
-        const float value = kBlackLevel_dn + 0.5F + signal + std::sqrt(amplifier.shot * signal + amplifier.read) * normal[x];
+        const float value =
+            kBlackLevel_dn + 0.5F + signal + std::sqrt(amplifier.shot * signal + amplifier.read) * normal[x];
         const float low = value > 0.0F ? value : 0.0F;
         out[x] = static_cast<std::uint8_t>(static_cast<int>(low < 255.0F ? low : 255.0F));
     }
@@ -91,8 +94,10 @@ Sensor::Sensor(const HelmetCamera& camera, double defocus_px, double vignetting,
     const double corner = std::hypot(0.5 * camera.width_px, 0.5 * camera.height_px);
     for (std::size_t y = 0; y < height_; ++y) {
         for (std::size_t x = 0; x < width_; ++x) {
-            const double r = std::hypot(static_cast<double>(x) - camera.cx_px, static_cast<double>(y) - camera.cy_px);
-            vignetting_.push_back(static_cast<float>(1.0 - vignetting * std::min(1.3, (r * r) / (corner * corner))));
+            const double r =
+                std::hypot(static_cast<double>(x) - camera.cx_px, static_cast<double>(y) - camera.cy_px);
+            vignetting_.push_back(
+                static_cast<float>(1.0 - vignetting * std::min(1.3, (r * r) / (corner * corner))));
         }
     }
     constexpr std::size_t kCount = std::size_t{1} << kQuantileBits;
@@ -107,24 +112,28 @@ Sensor::Sensor(const HelmetCamera& camera, double defocus_px, double vignetting,
 void Sensor::blur(Radiance& light) {
     const std::size_t reach = taps_.size() - 1;
     if (reach == 0) return;
-    const std::size_t left = std::max<std::size_t>(static_cast<std::size_t>(light.first_column), 2 * reach) - reach;
+    const std::size_t left =
+        std::max<std::size_t>(static_cast<std::size_t>(light.first_column), 2 * reach) - reach;
     const std::size_t right = std::min(static_cast<std::size_t>(light.end_column) + reach, width_ - reach);
-    const std::size_t top = std::max<std::size_t>(static_cast<std::size_t>(light.first_row), 2 * reach) - reach;
+    const std::size_t top =
+        std::max<std::size_t>(static_cast<std::size_t>(light.first_row), 2 * reach) - reach;
     const std::size_t bottom = std::min(static_cast<std::size_t>(light.end_row) + reach, height_ - reach);
     if (left >= right || top >= bottom) return;
     const std::size_t span = right - left;
     for (std::size_t y = top - reach; y < bottom + reach; ++y) {
-        convolve(light.values.data() + y * width_ + left, 1, taps_, span, scratch_.data() + y * width_ + left);
+        convolve(light.values.data() + y * width_ + left, 1, taps_, span,
+                 scratch_.data() + y * width_ + left);
     }
     for (std::size_t y = top; y < bottom; ++y) {
-        convolve(scratch_.data() + y * width_ + left, width_, taps_, span, light.values.data() + y * width_ + left);
+        convolve(scratch_.data() + y * width_ + left, width_, taps_, span,
+                 light.values.data() + y * width_ + left);
     }
 }
 
 void Sensor::expose(Radiance& light, const CameraControl& control, std::uint64_t seed, std::uint64_t frame,
                     std::uint64_t camera, std::span<std::uint8_t> image) {
     blur(light);
-    const float gain = std::pow(10.0F, std::clamp(control.gain_db, -20.0F, 40.0F) / 20.0F);
+    const float gain = std::pow(10.0F, std::clamp(control.gain_db, -20.0F, 48.0F) / 20.0F);
     const float exposure = std::clamp(control.exposure_us, 0.0F, 100000.0F) / kNominalExposure_us;
     const float shot = noise_ * noise_ * gain / kElectronsPerDn;  // variance per DN of signal after gain
     const float read = noise_ * noise_ * gain * gain * kReadNoise_dn * kReadNoise_dn;
@@ -132,8 +141,8 @@ void Sensor::expose(Radiance& light, const CameraControl& control, std::uint64_t
     for (std::size_t y = 0; y < height_; ++y) {
         fill_normal(mix_bits(stream + y), quantiles_, noise_row_);
         const Amplifier amplifier{exposure * gain, shot, read};
-        digitise(amplifier, light.values.data() + y * width_, vignetting_.data() + y * width_, noise_row_.data(), width_,
-                 image.data() + y * width_);
+        digitise(amplifier, light.values.data() + y * width_, vignetting_.data() + y * width_,
+                 noise_row_.data(), width_, image.data() + y * width_);
     }
 }
 

@@ -1,4 +1,5 @@
-// From light on the focal plane to the 8-bit picture: defocus, vignetting, exposure, gain, shot and read noise.
+// From light on the focal plane to the 8-bit picture: defocus, vignetting, exposure, gain, shot and read
+// noise.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,7 @@ inline constexpr float kNominalExposure_us = 2000.0F;
 
 struct CameraControl {
     float exposure_us = kNominalExposure_us;  // 0 .. 100 000
-    float gain_db = 0.0F;                     // -20 .. 40
+    float gain_db = 0.0F;                     // -20 .. 48
 };
 
 // Radiance of an image: DN at nominal exposure and gain, before vignetting; rows without gaps.
@@ -28,7 +29,8 @@ class Sensor {
     // defocus_px: standard deviation of the blur, 0 .. 3. noise: factor on both kinds, 0 = none.
     Sensor(const HelmetCamera& camera, double defocus_px, double vignetting, double noise);
 
-    // Blurs `light` in place, then writes width * height bytes. Equal seed, frame, camera and light give equal bytes.
+    // Blurs `light` in place, then writes width * height bytes. Equal seed, frame, camera and light give
+    // equal bytes.
     void expose(Radiance& light, const CameraControl& control, std::uint64_t seed, std::uint64_t frame,
                 std::uint64_t camera, std::span<std::uint8_t> image);
 

@@ -41,7 +41,8 @@ Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
 Result<SharedImages, FileError> SharedImages::create(std::size_t bytes) {
     Descriptor fd(::memfd_create("rig-world", MFD_CLOEXEC | MFD_ALLOW_SEALING));
     if (fd.get() < 0) return system_failure("shared memory", "memfd_create");
-    if (::ftruncate(fd.get(), static_cast<off_t>(bytes)) != 0) return system_failure("shared memory", "cannot be sized");
+    if (::ftruncate(fd.get(), static_cast<off_t>(bytes)) != 0)
+        return system_failure("shared memory", "cannot be sized");
     if (::fcntl(fd.get(), F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) != 0) {
         return system_failure("shared memory", "cannot be sealed");
     }
@@ -51,7 +52,9 @@ Result<SharedImages, FileError> SharedImages::create(std::size_t bytes) {
 }
 
 SharedImages::SharedImages(SharedImages&& other) noexcept
-    : fd_(std::move(other.fd_)), data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+    : fd_(std::move(other.fd_)),
+      data_(std::exchange(other.data_, nullptr)),
+      size_(std::exchange(other.size_, 0)) {}
 
 SharedImages::~SharedImages() {
     if (data_ != nullptr) ::munmap(data_, size_);
@@ -62,10 +65,11 @@ Result<Descriptor, FileError> listen_at(const std::filesystem::path& path) {
     address.sun_family = AF_UNIX;
     const std::string name = path.string();
     if (name.empty() || name.size() >= sizeof(address.sun_path)) {
-        return file_failure(path, "a socket path has 1 to 107 bytes; use a shorter one, for example under /tmp");
+        return file_failure(path,
+                            "a socket path has 1 to 107 bytes; use a shorter one, for example under /tmp");
     }
     std::memcpy(address.sun_path, name.c_str(), name.size() + 1);
-    struct stat found {};
+    struct stat found{};
     if (::lstat(name.c_str(), &found) == 0) {
         if (!S_ISSOCK(found.st_mode)) return file_failure(path, "is there and is not a socket");
         if (is_answered(address)) return file_failure(path, "another world is serving here");
@@ -101,7 +105,8 @@ bool send_all(int socket, std::span<const std::byte> bytes, int descriptor) {
             if (errno == EINTR) continue;
             if (errno != EAGAIN && errno != EWOULDBLOCK) return false;
             pollfd ready{socket, POLLOUT, 0};
-            if (::poll(&ready, 1, 1000) <= 0) return false;  // a daemon that has not read for a second is gone
+            if (::poll(&ready, 1, 1000) <= 0)
+                return false;  // a daemon that has not read for a second is gone
             continue;
         }
         descriptor = -1;

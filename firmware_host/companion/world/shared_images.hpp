@@ -1,4 +1,5 @@
-// The shared memory of the world boundary, and the sockets that pass it on. Thin over memfd_create, mmap and sendmsg.
+// The shared memory of the world boundary, and the sockets that pass it on. Thin over memfd_create, mmap and
+// sendmsg.
 #pragma once
 
 #include <cstddef>
@@ -41,14 +42,15 @@ class SharedImages {
     [[nodiscard]] int descriptor() const { return fd_.get(); }
 
   private:
-    SharedImages(Descriptor fd, std::uint8_t* data, std::size_t size) : fd_(std::move(fd)), data_(data), size_(size) {}
+    SharedImages(Descriptor fd, std::uint8_t* data, std::size_t size)
+        : fd_(std::move(fd)), data_(data), size_(size) {}
     Descriptor fd_;
     std::uint8_t* data_;
     std::size_t size_;
 };
 
-// A listening Unix stream socket at `path`. Refuses: a path longer than a socket address holds, a file there that is no
-// socket or that somebody listens on.
+// A listening Unix stream socket at `path`. Refuses: a path longer than a socket address holds, a file there
+// that is no socket or that somebody listens on.
 [[nodiscard]] Result<Descriptor, FileError> listen_at(const std::filesystem::path& path);
 
 // All bytes, with `descriptor` as ancillary data unless it is -1. False when the peer is gone.

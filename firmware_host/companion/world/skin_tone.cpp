@@ -12,7 +12,8 @@ namespace rig::host {
 
 namespace {
 
-// Reflectances in the near infrared and green, where such cameras look; eye-balled against the reference pictures.
+// Reflectances in the near infrared and green, where such cameras look; eye-balled against the reference
+// pictures.
 constexpr double kSkinAlbedo = 0.62;
 constexpr double kLipAlbedo = 0.46;
 constexpr double kBrowAlbedo = 0.30;
@@ -59,7 +60,8 @@ double bump(double distance, double inner, double outer) {
 double brow_at(std::uint64_t seed, const Vec3d& p) {
     if (p[2] < 0.0) return 0.0;
     const double along = std::abs(p[0]);
-    const double middle = 21.0 + 5.0 * std::sin(std::clamp((along - 14.0) / 38.0, 0.0, 1.0) * 0.75 * std::numbers::pi);
+    const double middle =
+        21.0 + 5.0 * std::sin(std::clamp((along - 14.0) / 38.0, 0.0, 1.0) * 0.75 * std::numbers::pi);
     const double half_height = 3.6 - 1.6 * std::clamp((along - 14.0) / 38.0, 0.0, 1.0);
     const double band = bump(std::abs(p[1] - middle), 0.4 * half_height, 1.3 * half_height);
     const double ends = bump(-along, -16.0, -9.0) * bump(along, 44.0, 54.0);
@@ -191,14 +193,17 @@ class DepthMap {
             p[k][0] = (p[k][0] - low_[0]) / cell_;
             p[k][1] = (p[k][1] - low_[1]) / cell_;
         }
-        const double area = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[2][0] - p[0][0]) * (p[1][1] - p[0][1]);
+        const double area =
+            (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[2][0] - p[0][0]) * (p[1][1] - p[0][1]);
         if (area == 0.0) return;
         const auto [x0, x1] = std::minmax({p[0][0], p[1][0], p[2][0]});
         const auto [y0, y1] = std::minmax({p[0][1], p[1][1], p[2][1]});
         for (double y = std::ceil(y0); y <= y1; y += 1.0) {
             for (double x = std::ceil(x0); x <= x1; x += 1.0) {
-                const double b = ((x - p[0][0]) * (p[2][1] - p[0][1]) - (p[2][0] - p[0][0]) * (y - p[0][1])) / area;
-                const double c = ((p[1][0] - p[0][0]) * (y - p[0][1]) - (x - p[0][0]) * (p[1][1] - p[0][1])) / area;
+                const double b =
+                    ((x - p[0][0]) * (p[2][1] - p[0][1]) - (p[2][0] - p[0][0]) * (y - p[0][1])) / area;
+                const double c =
+                    ((p[1][0] - p[0][0]) * (y - p[0][1]) - (x - p[0][0]) * (p[1][1] - p[0][1])) / area;
                 if (b < 0.0 || c < 0.0 || b + c > 1.0) continue;
                 const double depth = p[0][2] + b * (p[1][2] - p[0][2]) + c * (p[2][2] - p[0][2]);
                 double& cell = depth_[static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x)];
@@ -223,7 +228,8 @@ SkinTone skin_tone(const Rig& rig, std::uint64_t seed) {
     std::vector<std::uint8_t> part(rest.size(), 0);
     std::vector<bool> is_skin(rest.size(), false);
     for (std::size_t t = rig.triangles.size(); t-- > 0;) {
-        for (const std::int32_t v : rig.triangles[t]) part[static_cast<std::size_t>(v)] = rig.triangle_part[t];
+        for (const std::int32_t v : rig.triangles[t])
+            part[static_cast<std::size_t>(v)] = rig.triangle_part[t];
     }
     std::vector<Surface> surfaces(256, Surface::kSkin);
     for (std::size_t p = 0; p < rig.parts.size() && p < 256; ++p) surfaces[p] = surface_of(rig.parts[p]);
@@ -247,11 +253,23 @@ SkinTone skin_tone(const Rig& rig, std::uint64_t seed) {
                 gloss += 0.25 * lip;
                 break;
             }
-            case Surface::kNeck: albedo = kNeckAlbedo * blotch; gloss = 0.1; break;
+            case Surface::kNeck:
+                albedo = kNeckAlbedo * blotch;
+                gloss = 0.1;
+                break;
             case Surface::kEyeWhite:
-            case Surface::kIris: albedo = eye_albedo(p, centres[part[v]]); gloss = 1.0; break;
-            case Surface::kTeeth: albedo = kTeethAlbedo; gloss = 0.6; break;
-            case Surface::kGums: albedo = kGumsAlbedo * blotch; gloss = 0.6; break;
+            case Surface::kIris:
+                albedo = eye_albedo(p, centres[part[v]]);
+                gloss = 1.0;
+                break;
+            case Surface::kTeeth:
+                albedo = kTeethAlbedo;
+                gloss = 0.6;
+                break;
+            case Surface::kGums:
+                albedo = kGumsAlbedo * blotch;
+                gloss = 0.6;
+                break;
         }
         tone.albedo[v] = static_cast<float>(std::clamp(albedo, 0.0, 1.0));
         tone.gloss[v] = static_cast<float>(gloss);
@@ -259,7 +277,8 @@ SkinTone skin_tone(const Rig& rig, std::uint64_t seed) {
     return tone;
 }
 
-std::vector<float> skin_openness(const Rig& rig, std::span<const Int3> triangles, std::span<const Float3> normals) {
+std::vector<float> skin_openness(const Rig& rig, std::span<const Int3> triangles,
+                                 std::span<const Float3> normals) {
     constexpr int kDirections = 48;
     constexpr double kBias_mm = 3.0;
     const std::size_t count = rig.vertices_mm.size();

@@ -11,13 +11,20 @@ namespace {
 constexpr double kDriftShare = 0.62;
 constexpr double kJoltShare = 0.22;
 constexpr double kStepShare = 0.16;
-constexpr double kJoltWindow_s = 2.7;    // one jolt in each
-constexpr double kJoltRing_hz = 6.0;     // a helmet on a strap
+constexpr double kJoltWindow_s = 2.7;  // one jolt in each
+constexpr double kJoltRing_hz = 6.0;   // a helmet on a strap
 constexpr double kJoltDecay_s = 0.12;
-constexpr double kStepWindow_s = 11.0;   // one step in each
+constexpr double kStepWindow_s = 11.0;  // one step in each
 constexpr double kStepRise_s = 0.08;
 
-enum Stream : std::uint64_t { kFrequency = 100, kPhase = 200, kJoltTime = 300, kJoltSize = 400, kStepTime = 500, kStepSize = 600 };
+enum Stream : std::uint64_t {
+    kFrequency = 100,
+    kPhase = 200,
+    kJoltTime = 300,
+    kJoltSize = 400,
+    kStepTime = 500,
+    kStepSize = 600
+};
 
 double smooth_rise(double x) {
     const double t = std::clamp(x, 0.0, 1.0);
@@ -31,9 +38,12 @@ SlipMotion::SlipMotion(SlipKind kind, std::uint64_t seed) : kind_(kind), seed_(s
 SlipBound SlipMotion::bound() const {
     constexpr double kRadian = std::numbers::pi / 180.0;
     switch (kind_) {
-        case SlipKind::kGentle: return {1.5 * kRadian, 4.0};
-        case SlipKind::kHard: return {3.0 * kRadian, 8.0};
-        case SlipKind::kNone: break;
+        case SlipKind::kGentle:
+            return {1.5 * kRadian, 4.0};
+        case SlipKind::kHard:
+            return {3.0 * kRadian, 8.0};
+        case SlipKind::kNone:
+            break;
     }
     return {};
 }
@@ -56,12 +66,15 @@ double SlipMotion::jolts(std::uint64_t axis, double time_s) const {
     const auto window = static_cast<std::int64_t>(std::floor(time_s / kJoltWindow_s));
     for (std::int64_t w = window; w >= std::max<std::int64_t>(0, window - 1); --w) {
         const auto index = static_cast<std::uint64_t>(w);
-        // A jolt shakes all axes at the same moment, in the first part of its window so that one never meets the next.
-        const double start = kJoltWindow_s * (static_cast<double>(w) + 0.1 + 0.5 * uniform(seed_, kJoltTime, index));
+        // A jolt shakes all axes at the same moment, in the first part of its window so that one never meets
+        // the next.
+        const double start =
+            kJoltWindow_s * (static_cast<double>(w) + 0.1 + 0.5 * uniform(seed_, kJoltTime, index));
         const double since = time_s - start;
         if (since < 0.0) continue;
         const double size = 2.0 * uniform(seed_, kJoltSize + axis, index) - 1.0;
-        return size * std::exp(-since / kJoltDecay_s) * std::sin(2.0 * std::numbers::pi * kJoltRing_hz * since);
+        return size * std::exp(-since / kJoltDecay_s) *
+               std::sin(2.0 * std::numbers::pi * kJoltRing_hz * since);
     }
     return 0.0;
 }
@@ -69,7 +82,8 @@ double SlipMotion::jolts(std::uint64_t axis, double time_s) const {
 // Between two levels, the older of which is 0 at the start of the take.
 double SlipMotion::steps(std::uint64_t axis, double time_s) const {
     const auto window = static_cast<std::uint64_t>(std::floor(time_s / kStepWindow_s));
-    const double start = kStepWindow_s * (static_cast<double>(window) + 0.2 + 0.6 * uniform(seed_, kStepTime, window));
+    const double start =
+        kStepWindow_s * (static_cast<double>(window) + 0.2 + 0.6 * uniform(seed_, kStepTime, window));
     const double before = window == 0 ? 0.0 : 2.0 * uniform(seed_, kStepSize + axis, window - 1) - 1.0;
     const double after = 2.0 * uniform(seed_, kStepSize + axis, window) - 1.0;
     return before + (after - before) * smooth_rise((time_s - start) / kStepRise_s);
@@ -81,8 +95,8 @@ HeadsetSlip SlipMotion::at(double time_s) const {
     const SlipBound limit = bound();
     const double per_axis = 1.0 / std::sqrt(3.0);
     for (std::uint64_t axis = 0; axis < 6; ++axis) {
-        const double value = per_axis * (kDriftShare * drift(axis, time_s) + kJoltShare * jolts(axis, time_s) +
-                                         kStepShare * steps(axis, time_s));
+        const double value = per_axis * (kDriftShare * drift(axis, time_s) +
+                                         kJoltShare * jolts(axis, time_s) + kStepShare * steps(axis, time_s));
         if (axis < 3) {
             slip.rotation_rad[axis] = limit.rotation_rad * value;
         } else {

@@ -1,5 +1,5 @@
-// How the helmet moves on the head while a take runs: slow drift, small jolts that ring down, now and then a step that
-// stays. A pure function of seed and time.
+// How the helmet moves on the head while a take runs: slow drift, small jolts that ring down, now and then a
+// step that stays. A pure function of seed and time.
 #pragma once
 
 #include <cstdint>

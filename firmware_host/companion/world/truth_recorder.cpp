@@ -14,7 +14,8 @@ TruthRecorder::TruthRecorder(const World& world) : world_(world) {
     const std::size_t sights = world.frame_count() * world.cameras().size() * world.marker_count();
     projections_.reserve(3 * sights);
     constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-    for (std::size_t i = 0; i < sights; ++i) projections_.insert(projections_.end(), {kUnknown, kUnknown, -1.0F});
+    for (std::size_t i = 0; i < sights; ++i)
+        projections_.insert(projections_.end(), {kUnknown, kUnknown, -1.0F});
     dots_.assign(4 * sights, kUnknown);
 }
 
@@ -60,7 +61,8 @@ Result<void, FileError> TruthRecorder::save_motion(const std::filesystem::path& 
             }
         }
         weights.weights.insert(weights.weights.end(), truth.weights.begin(), truth.weights.end());
-        slip.integer(static_cast<std::int64_t>(frame)).number(static_cast<double>(frame) / world_.config().rate_hz, 6);
+        slip.integer(static_cast<std::int64_t>(frame))
+            .number(static_cast<double>(frame) / world_.config().rate_hz, 6);
         for (const double r : truth.slip.rotation_rad) slip.number(r, 9);
         for (const double t : truth.slip.translation_mm) slip.number(t, 6);
         slip.end_row();

@@ -16,8 +16,8 @@ class TruthRecorder {
 
     // sights: camera_count * marker_count, cameras outermost.
     void add(std::size_t frame, const std::vector<MarkerSight>& sights);
-    // Markers, weights and slip of every frame of the world; projections of the frames that were added, -1 in place of
-    // `visible` for the others.
+    // Markers, weights and slip of every frame of the world; projections of the frames that were added, -1 in
+    // place of `visible` for the others.
     [[nodiscard]] Result<void, FileError> save(const std::filesystem::path& folder) const;
 
   private:

@@ -1,5 +1,5 @@
-// Three numbers and three by three, in double, for the simulated world alone: the world is the oracle that may
-// contradict core, so it shares no arithmetic with it.
+// Three numbers and three by three, in double, for the simulated world alone: the world is the oracle that
+// may contradict core, so it shares no arithmetic with it.
 #pragma once
 
 #include <array>
@@ -44,7 +44,8 @@ inline constexpr Mat3d kIdentity3 = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     Mat3d product{};
     for (std::size_t row = 0; row < 3; ++row) {
         for (std::size_t column = 0; column < 3; ++column) {
-            for (std::size_t k = 0; k < 3; ++k) product[3 * row + column] += a[3 * row + k] * b[3 * k + column];
+            for (std::size_t k = 0; k < 3; ++k)
+                product[3 * row + column] += a[3 * row + k] * b[3 * k + column];
         }
     }
     return product;

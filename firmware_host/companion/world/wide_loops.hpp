@@ -1,6 +1,7 @@
-// Marks a function whose plain loops are worth a second copy for wider vectors, chosen when the program starts. Both
-// copies do the same operations on each element in the same order (no contraction, no reassociation), so the results
-// are equal. Sanitizers are not ready when the choice is made, and other compilers have no such thing.
+// Marks a function whose plain loops are worth a second copy for wider vectors, chosen when the program
+// starts. Both copies do the same operations on each element in the same order (no contraction, no
+// reassociation), so the results are equal. Sanitizers are not ready when the choice is made, and other
+// compilers have no such thing.
 #pragma once
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \

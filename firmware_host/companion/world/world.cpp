@@ -16,11 +16,14 @@ std::string fault_of_config(const WorldConfig& config) {
         return fmt::format("{} cameras; a helmet has 1 to {}", config.cameras.size(), kMaxCameras);
     }
     for (const HelmetCamera& camera : config.cameras) {
-        if (camera.width_px != config.cameras[0].width_px || camera.height_px != config.cameras[0].height_px) {
+        if (camera.width_px != config.cameras[0].width_px ||
+            camera.height_px != config.cameras[0].height_px) {
             return "cameras differ in image size";
         }
     }
-    const auto outside = [](double value, double low, double high) { return !(value >= low && value <= high); };
+    const auto outside = [](double value, double low, double high) {
+        return !(value >= low && value <= high);
+    };
     if (outside(config.dot_radius_mm, 0.3, 6.0)) return "the dot radius must be 0.3 to 6 mm";
     if (outside(config.rate_hz, 1.0, 1000.0)) return "the rate must be 1 to 1000 Hz";
     if (outside(config.defocus_px, 0.0, 3.0)) return "the defocus must be 0 to 3 px";
@@ -29,12 +32,16 @@ std::string fault_of_config(const WorldConfig& config) {
     return {};
 }
 
-std::string fault_of_head(const Rig& rig, const MarkerLayout& layout, const Take& take, const WorldConfig& config) {
+std::string fault_of_head(const Rig& rig, const MarkerLayout& layout, const Take& take,
+                          const WorldConfig& config) {
     if (layout.markers.empty() || layout.markers.size() > kMaxMarkers) {
         return fmt::format("{} markers; a layout has 1 to {}", layout.markers.size(), kMaxMarkers);
     }
-    const auto bad = [&](std::int32_t v) { return v < 0 || static_cast<std::size_t>(v) >= rig.vertices_mm.size(); };
-    if (rig.triangle_part.size() != rig.triangles.size()) return "triangle parts and triangles differ in number";
+    const auto bad = [&](std::int32_t v) {
+        return v < 0 || static_cast<std::size_t>(v) >= rig.vertices_mm.size();
+    };
+    if (rig.triangle_part.size() != rig.triangles.size())
+        return "triangle parts and triangles differ in number";
     for (const Int3& t : rig.triangles) {
         if (bad(t[0]) || bad(t[1]) || bad(t[2])) return "a triangle names a vertex that is not there";
     }
@@ -49,18 +56,20 @@ std::string fault_of_head(const Rig& rig, const MarkerLayout& layout, const Take
             return "marker " + marker.name + " names a vertex that is not there";
         }
     }
-    if (take.weights.size() != take.frame_count * rig.shapes.size()) return "the take does not fit the rig's shapes";
+    if (take.weights.size() != take.frame_count * rig.shapes.size())
+        return "the take does not fit the rig's shapes";
     if (!(take.rate_hz > 0.0)) return "the take's rate must be positive";
     if (config.start_frame >= take.frame_count) {
-        return fmt::format("start frame {} is beyond the take's {} frames", config.start_frame, take.frame_count);
+        return fmt::format("start frame {} is beyond the take's {} frames", config.start_frame,
+                           take.frame_count);
     }
     return {};
 }
 
 }  // namespace
 
-Result<std::unique_ptr<World>, FileError> World::create(const Rig& rig, const MarkerLayout& layout, const Take& take,
-                                                        const WorldConfig& config) {
+Result<std::unique_ptr<World>, FileError> World::create(const Rig& rig, const MarkerLayout& layout,
+                                                        const Take& take, const WorldConfig& config) {
     for (const std::string& fault : {fault_of_config(config), fault_of_head(rig, layout, take, config)}) {
         if (!fault.empty()) return failure(FileError{"world: " + fault});
     }
@@ -77,12 +86,14 @@ World::World(const Rig& rig, const MarkerLayout& layout, const Take& take, const
     for (const LayoutMarker& marker : layout.markers) marker_names_.push_back(marker.name);
     for (const SparseShape& shape : rig.shapes) shape_names_.push_back(shape.name);
     const auto left = static_cast<double>(take.frame_count - config.start_frame - 1);
-    const auto available = static_cast<std::size_t>(std::floor(left * config.rate_hz / take.rate_hz + 1e-6)) + 1;
+    const auto available =
+        static_cast<std::size_t>(std::floor(left * config.rate_hz / take.rate_hz + 1e-6)) + 1;
     frame_count_ = config.frame_count == 0 ? available : std::min(available, config.frame_count);
 }
 
 std::size_t World::image_bytes() const {
-    return static_cast<std::size_t>(config_.cameras[0].width_px) * static_cast<std::size_t>(config_.cameras[0].height_px);
+    return static_cast<std::size_t>(config_.cameras[0].width_px) *
+           static_cast<std::size_t>(config_.cameras[0].height_px);
 }
 
 std::size_t World::take_frame(std::size_t frame) const {

@@ -1,6 +1,6 @@
-// The simulated world: a performance on a painted head, seen by the cameras of a helmet, with its truth. It is the
-// oracle that core is judged by, and shares no camera or geometry code with it. What it is not: a clock or a link; see
-// world_server.hpp.
+// The simulated world: a performance on a painted head, seen by the cameras of a helmet, with its truth. It
+// is the oracle that core is judged by, and shares no camera or geometry code with it. What it is not: a
+// clock or a link; see world_server.hpp.
 #pragma once
 
 #include <cstdint>
@@ -34,29 +34,31 @@ struct WorldConfig {
 };
 
 struct FrameTruth {
-    std::vector<float> weights;       // rig order
+    std::vector<float> weights;  // rig order
     HeadsetSlip slip;
-    std::vector<Vec3d> face_mm;       // markers, neutral + B w
-    std::vector<Vec3d> headset_mm;    // the same with slip: what the cameras look at
+    std::vector<Vec3d> face_mm;     // markers, neutral + B w
+    std::vector<Vec3d> headset_mm;  // the same with slip: what the cameras look at
 };
 
 // One marker in one image. Integers are pixel centres.
 struct MarkerSight {
     double x_px = 0.0;  // projected centre, whether or not something is in front of it
     double y_px = 0.0;
-    double dot_x_px = 0.0;      // area centroid of the dot's visible part; NaN when none of it is
+    double dot_x_px = 0.0;  // area centroid of the dot's visible part; NaN when none of it is
     double dot_y_px = 0.0;
     double dot_area_px = 0.0;
-    double cos_view = 0.0;      // between the skin's normal and the direction to the camera
-    bool visible = false;       // the centre is in the image, faces the camera and nothing hides it
+    double cos_view = 0.0;  // between the skin's normal and the direction to the camera
+    bool visible = false;   // the centre is in the image, faces the camera and nothing hides it
 };
 
 class World {
   public:
-    // Refuses, with the fault: no markers, more than kMaxMarkers, indices out of range, a start beyond the take, a
-    // camera list that is empty or mixes sizes, numbers out of their stated ranges.
-    [[nodiscard]] static Result<std::unique_ptr<World>, FileError> create(const Rig& rig, const MarkerLayout& layout,
-                                                                          const Take& take, const WorldConfig& config);
+    // Refuses, with the fault: no markers, more than kMaxMarkers, indices out of range, a start beyond the
+    // take, a camera list that is empty or mixes sizes, numbers out of their stated ranges.
+    [[nodiscard]] static Result<std::unique_ptr<World>, FileError> create(const Rig& rig,
+                                                                          const MarkerLayout& layout,
+                                                                          const Take& take,
+                                                                          const WorldConfig& config);
 
     [[nodiscard]] const WorldConfig& config() const { return config_; }
     [[nodiscard]] const std::vector<HelmetCamera>& cameras() const { return config_.cameras; }
@@ -95,8 +97,8 @@ class WorldRenderer {
 
     // image: World::image_bytes() bytes, rows without gaps. sights: empty, or marker_count() entries to fill.
     // The pose is kept between calls for the same frame.
-    void render(std::size_t frame, std::size_t camera, const CameraControl& control, std::span<std::uint8_t> image,
-                std::span<MarkerSight> sights = {});
+    void render(std::size_t frame, std::size_t camera, const CameraControl& control,
+                std::span<std::uint8_t> image, std::span<MarkerSight> sights = {});
 
   private:
     struct DotSum {

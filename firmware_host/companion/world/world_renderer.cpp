@@ -9,11 +9,11 @@ namespace rig::host {
 
 namespace {
 
-constexpr float kInk = 0.13F;             // of the light that bare skin there would send back
-constexpr float kRetro_dn = 205.0F;       // of a reflector that faces the camera from 200 mm
+constexpr float kInk = 0.13F;        // of the light that bare skin there would send back
+constexpr float kRetro_dn = 205.0F;  // of a reflector that faces the camera from 200 mm
 constexpr double kRetroReference_mm = 200.0;
-constexpr double kHiddenBy_mm = 0.6;      // a surface this far in front of a marker hides it
-constexpr float kRimBand_mm = 1.5F;       // farther from a rim than this, a pixel is all paint or all skin
+constexpr double kHiddenBy_mm = 0.6;  // a surface this far in front of a marker hides it
+constexpr float kRimBand_mm = 1.5F;   // farther from a rim than this, a pixel is all paint or all skin
 constexpr std::size_t kNoFrame = std::numeric_limits<std::size_t>::max();
 
 struct Rest {
@@ -28,7 +28,8 @@ Rest rest_at(const PaintedFace& face, const Int3& corner, const TrianglePlane& p
     const float a = (1.0F - (plane.bx * dx + plane.by * dy) - (plane.cx * dx + plane.cy * dy)) * plane.iz;
     const float scale = 1.0F / (a + b + c);
     const auto mix = [&](const std::vector<float>& values) {
-        return scale * (a * values[static_cast<std::size_t>(corner[0])] + b * values[static_cast<std::size_t>(corner[1])] +
+        return scale * (a * values[static_cast<std::size_t>(corner[0])] +
+                        b * values[static_cast<std::size_t>(corner[1])] +
                         c * values[static_cast<std::size_t>(corner[2])]);
     };
     const VertexArrays& rest = face.rest_mm();
@@ -48,7 +49,8 @@ float length(const Rest& a) {
 }
 
 Rest centre_of(const Dot& painted) {
-    return {static_cast<float>(painted.rest_mm[0]), static_cast<float>(painted.rest_mm[1]), static_cast<float>(painted.rest_mm[2])};
+    return {static_cast<float>(painted.rest_mm[0]), static_cast<float>(painted.rest_mm[1]),
+            static_cast<float>(painted.rest_mm[2])};
 }
 
 // How far the point of the neutral face moves from one pixel to the next, in either direction of the image.
@@ -56,12 +58,13 @@ struct RestPerPixel {
     Rest x, y;
 };
 
-RestPerPixel change_at(const PaintedFace& face, const Int3& corner, const TrianglePlane& plane, const PixelGrid& grid,
-                       int column, int row) {
+RestPerPixel change_at(const PaintedFace& face, const Int3& corner, const TrianglePlane& plane,
+                       const PixelGrid& grid, int column, int row) {
     const IdealPoint here = grid.ray(column, row);
     const auto across = [&](const IdealPoint& neighbour) {
         const float dx = 0.5F * (neighbour.x - here.x), dy = 0.5F * (neighbour.y - here.y);
-        return rest_at(face, corner, plane, here.x + dx, here.y + dy) - rest_at(face, corner, plane, here.x - dx, here.y - dy);
+        return rest_at(face, corner, plane, here.x + dx, here.y + dy) -
+               rest_at(face, corner, plane, here.x - dx, here.y - dy);
     };
     // Towards the middle of the image, so that the neighbour exists; the sign of a change does not matter.
     const int beside = column + 1 < grid.width_px() ? column + 1 : column - 1;
@@ -85,7 +88,8 @@ WorldRenderer::WorldRenderer(const World& world)
       cos_view_(world.marker_count()) {
     for (const HelmetCamera& camera : world.cameras()) {
         grids_.emplace_back(camera);
-        sensors_.emplace_back(camera, world.config().defocus_px, world.config().vignetting, world.config().noise);
+        sensors_.emplace_back(camera, world.config().defocus_px, world.config().vignetting,
+                              world.config().noise);
     }
     radiance_.values.resize(world.image_bytes());
     radiance_.background = static_cast<float>(lighting_.background);
@@ -105,7 +109,8 @@ void WorldRenderer::render(std::size_t frame, std::size_t camera, const CameraCo
     view_ = world_.view(frame, camera);
     project(eye, view_, posed_.position_mm, seen_);
     light_vertices(lighting_, eye, view_, world_.face(), posed_, seen_);
-    rasterise(world_.face().triangles(), seen_, grids_[camera], surface_);
+    rasterise(world_.face().triangles(), world_.face().skin_triangle_count(), seen_, grids_[camera],
+              surface_);
     prepare_dots();
     shade(grids_[camera]);
     sensors_[camera].expose(radiance_, control, world_.config().seed, frame, camera, image);
@@ -119,7 +124,8 @@ void WorldRenderer::prepare_dots() {
         for (std::size_t k = 0; k < 3; ++k) {
             const auto v = static_cast<std::size_t>(dot_here.vertices[k]);
             const auto share = static_cast<double>(dot_here.barycentric[k]);
-            normal = normal + share * Vec3d{static_cast<double>(posed_.normal.x[v]), static_cast<double>(posed_.normal.y[v]),
+            normal = normal + share * Vec3d{static_cast<double>(posed_.normal.x[v]),
+                                            static_cast<double>(posed_.normal.y[v]),
                                             static_cast<double>(posed_.normal.z[v])};
         }
         const Vec3d seen_mm = multiply(view_.rotation, truth_.face_mm[m]) + view_.offset_mm;
@@ -127,7 +133,8 @@ void WorldRenderer::prepare_dots() {
         cos_view_[m] = -dot(normalised(multiply(view_.rotation, normal)), normalised(seen_mm));
         const double nearness = kRetroReference_mm / std::max(distance, 1.0);
         dots_[m] = {};
-        dots_[m].retro_dn = static_cast<float>(static_cast<double>(kRetro_dn) * retro_fade(cos_view_[m]) * nearness * nearness);
+        dots_[m].retro_dn = static_cast<float>(static_cast<double>(kRetro_dn) * retro_fade(cos_view_[m]) *
+                                               nearness * nearness);
     }
 }
 
@@ -139,7 +146,8 @@ void WorldRenderer::shade(const PixelGrid& grid) {
     radiance_.end_row = surface_.end_row;
     const PaintedFace& face = world_.face();
     for (int row = surface_.first_row; row < surface_.end_row; ++row) {
-        float* out = radiance_.values.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width_px());
+        float* out = radiance_.values.data() +
+                     static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.width_px());
         for (int column = surface_.first_column; column < surface_.end_column; ++column) {
             const std::uint32_t index = grid.plane(column, row);
             if (index == kNothing) continue;
@@ -154,7 +162,8 @@ void WorldRenderer::shade(const PixelGrid& grid) {
     }
 }
 
-// Coverage of the pixel by paint: distance to the dot's rim, measured on the neutral skin, over its change per pixel.
+// Coverage of the pixel by paint: distance to the dot's rim, measured on the neutral skin, over its change
+// per pixel.
 float WorldRenderer::paint(const PixelGrid& grid, int column, int row, std::uint32_t index, float skin_dn) {
     const PaintedFace& face = world_.face();
     const TrianglePlane& plane = surface_.planes[index];
@@ -189,7 +198,8 @@ float WorldRenderer::paint(const PixelGrid& grid, int column, int row, std::uint
 
 bool WorldRenderer::unhidden(std::size_t marker, const PixelAt& at, std::size_t camera) const {
     const HelmetCamera& eye = world_.cameras()[camera];
-    if (!(at.x_px > -0.5 && at.y_px > -0.5 && at.x_px < eye.width_px - 0.5 && at.y_px < eye.height_px - 0.5)) return false;
+    if (!(at.x_px > -0.5 && at.y_px > -0.5 && at.x_px < eye.width_px - 0.5 && at.y_px < eye.height_px - 0.5))
+        return false;
     const std::uint32_t index =
         grids_[camera].plane(static_cast<int>(std::lround(at.x_px)), static_cast<int>(std::lround(at.y_px)));
     if (index == kNothing) return false;
@@ -200,8 +210,10 @@ bool WorldRenderer::unhidden(std::size_t marker, const PixelAt& at, std::size_t 
     const double dx = eye.f_px * slope.x - static_cast<double>(plane.ax);
     const double dy = eye.f_px * slope.y - static_cast<double>(plane.ay);
     const double inverse = static_cast<double>(plane.iz) +
-                           static_cast<double>(plane.iz_b) * (static_cast<double>(plane.bx) * dx + static_cast<double>(plane.by) * dy) +
-                           static_cast<double>(plane.iz_c) * (static_cast<double>(plane.cx) * dx + static_cast<double>(plane.cy) * dy);
+                           static_cast<double>(plane.iz_b) *
+                               (static_cast<double>(plane.bx) * dx + static_cast<double>(plane.by) * dy) +
+                           static_cast<double>(plane.iz_c) *
+                               (static_cast<double>(plane.cx) * dx + static_cast<double>(plane.cy) * dy);
     return inverse > 0.0 && 1.0 / inverse > at.depth_mm - kHiddenBy_mm;
 }
 
@@ -213,11 +225,13 @@ void WorldRenderer::report(std::size_t camera, std::span<MarkerSight> sights) co
         sight.x_px = at.x_px;
         sight.y_px = at.y_px;
         sight.dot_area_px = dots_[m].area;
-        const double scale = dots_[m].area > 0.0 ? 1.0 / dots_[m].area : std::numeric_limits<double>::quiet_NaN();
+        const double scale =
+            dots_[m].area > 0.0 ? 1.0 / dots_[m].area : std::numeric_limits<double>::quiet_NaN();
         sight.dot_x_px = scale * dots_[m].x;
         sight.dot_y_px = scale * dots_[m].y;
         sight.cos_view = cos_view_[m];
-        sight.visible = at.depth_mm > 0.0 && cos_view_[m] > 0.0 && dots_[m].area > 0.0 && unhidden(m, at, camera);
+        sight.visible =
+            at.depth_mm > 0.0 && cos_view_[m] > 0.0 && dots_[m].area > 0.0 && unhidden(m, at, camera);
     }
 }
 

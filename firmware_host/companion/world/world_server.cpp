@@ -27,8 +27,8 @@ sim::WorldHello hello_of(const World& world, const ServerConfig& config) {
     hello.height_px = static_cast<std::uint16_t>(world.cameras()[0].height_px);
     hello.rate_millihertz = static_cast<std::uint32_t>(std::lround(1000.0 * world.config().rate_hz));
     hello.slot_count = config.slot_count;
-    hello.image_stride_bytes =
-        static_cast<std::uint32_t>((world.image_bytes() + kImageAlignment - 1) / kImageAlignment * kImageAlignment);
+    hello.image_stride_bytes = static_cast<std::uint32_t>((world.image_bytes() + kImageAlignment - 1) /
+                                                          kImageAlignment * kImageAlignment);
     hello.memory_bytes = std::uint64_t{hello.slot_count} * hello.camera_count * hello.image_stride_bytes;
     hello.frame_total = world.frame_count();
     return hello;
@@ -43,7 +43,10 @@ void ring(int wake) {
 }  // namespace
 
 WorldServer::WorldServer(const World& world, ServerConfig config, TruthRecorder* truth)
-    : world_(world), config_(std::move(config)), truth_(truth), wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    : world_(world),
+      config_(std::move(config)),
+      truth_(truth),
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     config_.slot_count = std::clamp<std::uint32_t>(config_.slot_count, 4, 64);
     config_.render_threads = std::clamp<std::size_t>(config_.render_threads, 1, 4);
 }
@@ -111,8 +114,8 @@ ServerEnd WorldServer::run(const Progress& progress) {
     if (!send_all(connection.get(), std::as_bytes(std::span(&hello, 1)), memory->descriptor())) {
         return ServerEnd::kDisconnected;
     }
-    FramesAhead frames(world_, memory->bytes(), hello.image_stride_bytes, config_.slot_count, config_.render_threads,
-                       truth_, [this] {
+    FramesAhead frames(world_, memory->bytes(), hello.image_stride_bytes, config_.slot_count,
+                       config_.render_threads, truth_, [this] {
                            ++counters_.rendered;
                            ring(wake_);
                        });

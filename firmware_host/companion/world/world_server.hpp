@@ -1,5 +1,5 @@
-// Serves a world over hal/sim/world_protocol.hpp: a Unix socket for messages, shared memory for images. What it is not:
-// the world itself, which is world.hpp and needs no server.
+// Serves a world over hal/sim/world_protocol.hpp: a Unix socket for messages, shared memory for images. What
+// it is not: the world itself, which is world.hpp and needs no server.
 #pragma once
 
 #include <atomic>
@@ -26,9 +26,9 @@ struct ButtonPress {
 struct ServerConfig {
     std::filesystem::path socket;
     sim::WorldPace pace = sim::WorldPace::kLockstep;
-    std::uint32_t slot_count = 8;     // 4 .. 64
-    std::size_t render_threads = 1;   // 1 .. 4; each renders whole frames ahead
-    std::int64_t readout_us = 0;      // real time: from the end of the exposure to the message
+    std::uint32_t slot_count = 8;         // 4 .. 64
+    std::size_t render_threads = 1;       // 1 .. 4; each renders whole frames ahead
+    std::int64_t readout_us = 0;          // real time: from the end of the exposure to the message
     std::int64_t connect_timeout_us = 0;  // 0: wait for a daemon until stop()
     std::vector<ButtonPress> presses;
 };
@@ -42,6 +42,7 @@ struct ServerCounters {
     std::atomic<std::uint64_t> overdue{0};    // real time: rendering fell behind by more than a frame
     std::atomic<std::uint64_t> ignored{0};    // messages of the daemon that make no sense
     std::atomic<std::uint64_t> lines_set{0};  // kSetLine messages
+    std::atomic<std::int64_t> start_us{0};    // mid-exposure of frame 0, on the run's clock; 0 before a daemon came
 };
 
 enum class ServerEnd : std::uint8_t {
@@ -63,7 +64,8 @@ class WorldServer {
     // Called from the serving thread after each frame set.
     using Progress = std::function<void(std::uint64_t sent, std::uint64_t total)>;
 
-    // Binds the socket; afterwards a daemon may connect. An old socket file that nobody listens on is replaced.
+    // Binds the socket; afterwards a daemon may connect. An old socket file that nobody listens on is
+    // replaced.
     [[nodiscard]] Result<void, FileError> listen();
     // Serves one daemon in the calling thread. listen() comes first.
     [[nodiscard]] ServerEnd run(const Progress& progress = {});

@@ -22,7 +22,7 @@ using sim::WorldPace;
 
 constexpr std::int64_t kLockstepStart_us = 1'000'000;
 constexpr std::int64_t kPress_us = 100'000;
-constexpr std::int64_t kFarewell_us = 5'000'000;   // for the daemon to hang up after kEnd
+constexpr std::int64_t kFarewell_us = 5'000'000;  // for the daemon to hang up after kEnd
 constexpr std::int64_t kFirstFrameLead_us = 20'000;
 constexpr std::int64_t kForever = std::numeric_limits<std::int64_t>::max();
 // Frames rendered beyond the last one sent. A control takes effect on the frame after those: the third.
@@ -36,8 +36,8 @@ std::int64_t monotonic_us() {
     return std::int64_t{1'000'000} * now.tv_sec + now.tv_nsec / 1000;
 }
 
-WorldSession::WorldSession(const World& world, const ServerConfig& config, ServerCounters& counters, FramesAhead& frames,
-                           int connection, int wake, const std::atomic<bool>& stop)
+WorldSession::WorldSession(const World& world, const ServerConfig& config, ServerCounters& counters,
+                           FramesAhead& frames, int connection, int wake, const std::atomic<bool>& stop)
     : world_(world),
       config_(config),
       counters_(counters),
@@ -49,12 +49,14 @@ WorldSession::WorldSession(const World& world, const ServerConfig& config, Serve
         edges_.push_back({press.at_us, press.line, true});
         edges_.push_back({press.at_us + kPress_us, press.line, false});
     }
-    std::stable_sort(edges_.begin(), edges_.end(), [](const Edge& a, const Edge& b) { return a.at_us < b.at_us; });
+    std::stable_sort(edges_.begin(), edges_.end(),
+                     [](const Edge& a, const Edge& b) { return a.at_us < b.at_us; });
 }
 
 ServerEnd WorldSession::run(const WorldServer::Progress& progress) {
     frames_.allow(kAhead);
-    const bool completed = config_.pace == WorldPace::kLockstep ? run_lockstep(progress) : run_real_time(progress);
+    const bool completed =
+        config_.pace == WorldPace::kLockstep ? run_lockstep(progress) : run_real_time(progress);
     return completed && send_end() ? ServerEnd::kCompleted : end_;
 }
 
@@ -72,12 +74,14 @@ std::int64_t WorldSession::exposure_us(std::size_t frame) const {
 
 bool WorldSession::run_lockstep(const WorldServer::Progress& progress) {
     start_us_ = kLockstepStart_us;
+    counters_.start_us = start_us_;
     for (std::size_t frame = 0; frame < world_.frame_count(); ++frame) {
         std::uint32_t slot = 0;
         if (!wait_for_frame(frame, kForever, slot)) return false;
         const std::int64_t half = exposure_us(frame) / 2;
         const std::int64_t middle = start_us_ + offset_us(frame);
-        if (!send_presses(offset_us(frame) - half) || !send_edge(WorldLine::kTrigger, true, middle - half)) return false;
+        if (!send_presses(offset_us(frame) - half) || !send_edge(WorldLine::kTrigger, true, middle - half))
+            return false;
         if (!send_frame(frame, slot)) return false;
         if (progress) progress(frame + 1, world_.frame_count());
         while (answered_ <= frame) {
@@ -92,6 +96,7 @@ bool WorldSession::run_real_time(const WorldServer::Progress& progress) {
     std::uint32_t slot = 0;
     if (!wait_for_frame(0, kForever, slot)) return false;
     start_us_ = monotonic_us() + kFirstFrameLead_us;
+    counters_.start_us = start_us_;
     for (std::size_t frame = 0; frame < world_.frame_count(); ++frame) {
         const std::int64_t half = exposure_us(frame) / 2;
         const std::int64_t middle = start_us_ + offset_us(frame);
@@ -193,7 +198,8 @@ bool WorldSession::pump(std::int64_t deadline_us) {
         return false;
     }
     std::array<pollfd, 2> ready = {pollfd{connection_, POLLIN, 0}, pollfd{wake_, POLLIN, 0}};
-    const std::int64_t left_us = deadline_us == kForever ? -1 : std::max<std::int64_t>(0, deadline_us - monotonic_us());
+    const std::int64_t left_us =
+        deadline_us == kForever ? -1 : std::max<std::int64_t>(0, deadline_us - monotonic_us());
     const timespec timeout{left_us / 1'000'000, 1000 * (left_us % 1'000'000)};
     const int count = ::ppoll(ready.data(), ready.size(), left_us < 0 ? nullptr : &timeout, nullptr);
     if (count < 0 && errno != EINTR) return false;
@@ -206,7 +212,8 @@ bool WorldSession::pump(std::int64_t deadline_us) {
 }
 
 bool WorldSession::receive() {
-    const ssize_t got = ::recv(connection_, inbox_.data() + inbox_bytes_, inbox_.size() - inbox_bytes_, MSG_DONTWAIT);
+    const ssize_t got =
+        ::recv(connection_, inbox_.data() + inbox_bytes_, inbox_.size() - inbox_bytes_, MSG_DONTWAIT);
     if (got == 0) return false;
     if (got < 0) return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
     inbox_bytes_ += static_cast<std::size_t>(got);
@@ -238,8 +245,11 @@ void WorldSession::obey(const WorldMessage& message) {
             ++counters_.lines_set;
             return;
         case WorldMessageKind::kExposure:
-        case WorldMessageKind::kGain: obey_control(message); return;
-        default: break;
+        case WorldMessageKind::kGain:
+            obey_control(message);
+            return;
+        default:
+            break;
     }
     ++counters_.ignored;
 }
@@ -256,7 +266,7 @@ void WorldSession::obey_control(const WorldMessage& message) {
         const auto longest = static_cast<float>(1e6 / world_.config().rate_hz);
         control.exposure_us = std::clamp(message.value, 0.0F, longest);
     } else {
-        control.gain_db = std::clamp(message.value, -20.0F, 40.0F);
+        control.gain_db = std::clamp(message.value, -20.0F, 48.0F);
     }
     frames_.control(first, camera, control);
 }

@@ -16,8 +16,8 @@ namespace rig::host {
 class WorldSession {
   public:
     // wake: becomes readable when a frame was rendered or stop was set.
-    WorldSession(const World& world, const ServerConfig& config, ServerCounters& counters, FramesAhead& frames,
-                 int connection, int wake, const std::atomic<bool>& stop);
+    WorldSession(const World& world, const ServerConfig& config, ServerCounters& counters,
+                 FramesAhead& frames, int connection, int wake, const std::atomic<bool>& stop);
 
     [[nodiscard]] ServerEnd run(const WorldServer::Progress& progress);
 
@@ -53,9 +53,9 @@ class WorldSession {
     int wake_;
     const std::atomic<bool>& stop_;
     ServerEnd end_ = ServerEnd::kDisconnected;
-    std::int64_t start_us_ = 0;      // time of frame 0
-    std::size_t sent_ = 0;           // frames sent or dropped: the next one's number
-    std::size_t answered_ = 0;       // lockstep: ticks done
+    std::int64_t start_us_ = 0;  // time of frame 0
+    std::size_t sent_ = 0;       // frames sent or dropped: the next one's number
+    std::size_t answered_ = 0;   // lockstep: ticks done
     std::vector<Edge> edges_;
     std::size_t next_edge_ = 0;
     std::array<std::byte, 64 * sizeof(sim::WorldMessage)> inbox_{};

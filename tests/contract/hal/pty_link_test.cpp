@@ -7,9 +7,11 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tests/support/temp_folder.hpp"
@@ -102,6 +104,21 @@ TEST_F(PtyLinkTest, NothingIsTranslatedAndNothingEchoed) {
     ASSERT_EQ(::write(slave.get(), nasty.data(), nasty.size()), static_cast<ssize_t>(nasty.size()));
     EXPECT_EQ(read_link(), nasty);
     EXPECT_EQ(read_some(slave), "");
+}
+
+TEST_F(PtyLinkTest, ClosingLetsAReaderTakeTheLastBytes) {
+    ASSERT_TRUE(link_.open());
+    const os::Descriptor slave = open_slave(path_);
+    const std::string last(3000, 'z');
+    ASSERT_EQ(link_.write(bytes_of(last)).value(), last.size());
+    std::string got;
+    std::thread reader([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(30));
+        got = read_some(slave);
+    });
+    link_.close();
+    reader.join();
+    EXPECT_EQ(got, last);
 }
 
 TEST_F(PtyLinkTest, SymlinkIsPublishedReplacedAndRemoved) {

@@ -19,7 +19,10 @@ struct Field {
     std::vector<double> values;
     Field(int w, int h, double value)
         : width(w), height(h), values(static_cast<std::size_t>(w) * static_cast<std::size_t>(h), value) {}
-    double& at(int x, int y) { return values[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)]; }
+    double& at(int x, int y) {
+        return values[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                      static_cast<std::size_t>(x)];
+    }
     [[nodiscard]] double clamped(int x, int y) const {
         const auto cx = static_cast<std::size_t>(std::clamp(x, 0, width - 1));
         const auto cy = static_cast<std::size_t>(std::clamp(y, 0, height - 1));
@@ -42,7 +45,8 @@ void blur(Field& field, double sigma) {
             for (int x = 0; x < field.width; ++x) {
                 double total = 0.0;
                 for (int i = -reach; i <= reach; ++i) {
-                    total += kernel[static_cast<std::size_t>(i + reach)] * (across ? source.clamped(x + i, y) : source.clamped(x, y + i));
+                    total += kernel[static_cast<std::size_t>(i + reach)] *
+                             (across ? source.clamped(x + i, y) : source.clamped(x, y + i));
                 }
                 field.at(x, y) = total / sum;
             }
@@ -62,7 +66,9 @@ void paint(Field& field, double cx, double cy, double reach, double factor, Insi
             int hits = 0;
             for (int j = 0; j < kSamples; ++j) {
                 for (int i = 0; i < kSamples; ++i) {
-                    hits += inside(x + (i + 0.5) / kSamples - 0.5 - cx, y + (j + 0.5) / kSamples - 0.5 - cy) ? 1 : 0;
+                    hits += inside(x + (i + 0.5) / kSamples - 0.5 - cx, y + (j + 0.5) / kSamples - 0.5 - cy)
+                                ? 1
+                                : 0;
                 }
             }
             const double cover = static_cast<double>(hits) / (kSamples * kSamples);
@@ -71,7 +77,8 @@ void paint(Field& field, double cx, double cy, double reach, double factor, Insi
     }
 }
 
-void paint_ellipse(Field& field, double x, double y, double long_px, double short_px, double angle, double factor) {
+void paint_ellipse(Field& field, double x, double y, double long_px, double short_px, double angle,
+                   double factor) {
     const double c = std::cos(angle);
     const double s = std::sin(angle);
     const double a = 0.5 * long_px;
@@ -83,7 +90,8 @@ void paint_ellipse(Field& field, double x, double y, double long_px, double shor
     });
 }
 
-// A chain of small discs along a bent line; every disc is drawn to its own part so that overlaps do not multiply.
+// A chain of small discs along a bent line; every disc is drawn to its own part so that overlaps do not
+// multiply.
 void paint_stroke(Field& field, SeededRandom& random, double length, double width, double factor) {
     const double x0 = random.uniform(20.0, field.width - 20.0);
     const double y0 = random.uniform(20.0, field.height - 20.0);
@@ -103,22 +111,25 @@ void add_clutter(Field& albedo, const Scene& scene, SeededRandom& random) {
     for (int i = 0; i < scene.clutter.shadows; ++i) {
         Field shade(albedo.width, albedo.height, 1.0);
         const double size = random.uniform(1.5, 5.0) * dot;
-        paint_ellipse(shade, random.uniform(0.0, albedo.width), random.uniform(0.0, albedo.height), 2.0 * size, size,
-                      random.uniform(0.0, 3.0), random.uniform(0.4, 0.8));
+        paint_ellipse(shade, random.uniform(0.0, albedo.width), random.uniform(0.0, albedo.height),
+                      2.0 * size, size, random.uniform(0.0, 3.0), random.uniform(0.4, 0.8));
         blur(shade, 0.3 * dot + 2.0);
         for (std::size_t k = 0; k < albedo.values.size(); ++k) albedo.values[k] *= shade.values[k];
     }
     for (int i = 0; i < scene.clutter.lines; ++i) {
-        paint_stroke(albedo, random, random.uniform(30.0, 120.0), random.uniform(1.5, 4.0), random.uniform(0.3, 0.7));
+        paint_stroke(albedo, random, random.uniform(30.0, 120.0), random.uniform(1.5, 4.0),
+                     random.uniform(0.3, 0.7));
     }
     for (int i = 0; i < scene.clutter.hairs; ++i) {
-        paint_stroke(albedo, random, random.uniform(20.0, 60.0), random.uniform(0.7, 1.6), random.uniform(0.2, 0.6));
+        paint_stroke(albedo, random, random.uniform(20.0, 60.0), random.uniform(0.7, 1.6),
+                     random.uniform(0.2, 0.6));
     }
     for (int i = 0; i < scene.clutter.patches; ++i) {
         const double size = random.uniform(3.0, 5.0) * dot;
         const double factor = random.chance(0.5) ? random.uniform(0.1, 0.5) : random.uniform(1.4, 2.0);
-        paint_ellipse(albedo, random.uniform(30.0, albedo.width - 30.0), random.uniform(30.0, albedo.height - 30.0), size,
-                      random.uniform(0.4, 1.0) * size, random.uniform(0.0, 3.0), factor);
+        paint_ellipse(albedo, random.uniform(30.0, albedo.width - 30.0),
+                      random.uniform(30.0, albedo.height - 30.0), size, random.uniform(0.4, 1.0) * size,
+                      random.uniform(0.0, 3.0), factor);
     }
 }
 
@@ -134,8 +145,9 @@ void add_dots(Field& albedo, const Scene& scene, SeededRandom& random) {
         paint_ellipse(one, dot.x_px - x0, dot.y_px - y0, dot.long_px, dot.short_px, dot.angle_rad, dot.paint);
         if (dot.glint) {
             const double play = 0.2 * dot.short_px;
-            paint_ellipse(one, dot.x_px - x0 + random.uniform(-play, play), dot.y_px - y0 + random.uniform(-play, play),
-                          0.25 * dot.short_px, 0.2 * dot.short_px, 0.3, 1.0 / dot.paint);
+            paint_ellipse(one, dot.x_px - x0 + random.uniform(-play, play),
+                          dot.y_px - y0 + random.uniform(-play, play), 0.25 * dot.short_px,
+                          0.2 * dot.short_px, 0.3, 1.0 / dot.paint);
         }
         for (int y = 0; y < side; ++y) {
             for (int x = 0; x < side; ++x) {
@@ -163,7 +175,9 @@ void add_light(Field& albedo, const Scene& scene, SeededRandom& random) {
         for (int x = 0; x < albedo.width; ++x) {
             const double u = (x - 0.5 * albedo.width) / (0.5 * albedo.width);
             const double v = (y - 0.5 * albedo.height) / (0.5 * albedo.height);
-            const double slope = 1.0 + 0.5 * light.gradient * (std::cos(direction) * u + std::sin(direction) * v) / std::numbers::sqrt2;
+            const double slope = 1.0 + 0.5 * light.gradient *
+                                           (std::cos(direction) * u + std::sin(direction) * v) /
+                                           std::numbers::sqrt2;
             const double edge = 1.0 - 0.5 * light.vignetting * (u * u + v * v);
             albedo.at(x, y) *= light.skin * slope * edge * (1.0 + scale * texture.at(x, y));
             if (scene.clutter.silhouette && u > 0.72 + 0.1 * v * v) albedo.at(x, y) = 6.0;
@@ -182,8 +196,10 @@ Picture render(const Scene& scene) {
     blur(field, scene.light.blur_px);
     Picture picture{scene.width_px, scene.height_px, {}};
     for (const double value : field.values) {
-        const double sigma = std::sqrt(scene.light.read_noise * scene.light.read_noise + scene.light.shot_noise * value);
-        picture.pixels.push_back(static_cast<std::uint8_t>(std::clamp(random.normal(value, sigma) + 0.5, 0.0, 255.0)));
+        const double sigma =
+            std::sqrt(scene.light.read_noise * scene.light.read_noise + scene.light.shot_noise * value);
+        picture.pixels.push_back(
+            static_cast<std::uint8_t>(std::clamp(random.normal(value, sigma) + 0.5, 0.0, 255.0)));
     }
     return picture;
 }
@@ -241,7 +257,8 @@ Picture shifted(const Picture& picture, int dx_px, int dy_px) {
             const auto sx = static_cast<std::size_t>(std::clamp(x - dx_px, 0, picture.width_px - 1));
             const auto sy = static_cast<std::size_t>(std::clamp(y - dy_px, 0, picture.height_px - 1));
             const auto width = static_cast<std::size_t>(picture.width_px);
-            result.pixels[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)] = picture.pixels[sy * width + sx];
+            result.pixels[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)] =
+                picture.pixels[sy * width + sx];
         }
     }
     return result;

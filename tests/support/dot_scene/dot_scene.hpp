@@ -1,5 +1,6 @@
-// Pictures of painted dots whose truth is known: discs in perspective on shaded, textured skin, with the things that
-// are no dots. Written from the optics, not from the detector, so that it can contradict it. Not a face.
+// Pictures of painted dots whose truth is known: discs in perspective on shaded, textured skin, with the
+// things that are no dots. Written from the optics, not from the detector, so that it can contradict it. Not
+// a face.
 #pragma once
 
 #include <cstdint>
@@ -15,26 +16,26 @@ struct SceneDot {
     double long_px = 10.0;  // diameters
     double short_px = 10.0;
     double angle_rad = 0.0;
-    double paint = 0.18;    // reflectance relative to skin: below 1 dark, above bright
-    bool glint = false;     // a specular highlight of skin's brightness lies on it
+    double paint = 0.18;  // reflectance relative to skin: below 1 dark, above bright
+    bool glint = false;   // a specular highlight of skin's brightness lies on it
 };
 
 struct SceneLight {
-    double skin = 110.0;        // grey level of unshaded skin
-    double gradient = 0.5;      // change of light across the picture, relative
-    double vignetting = 0.3;    // loss of light at the corners
-    double texture = 0.06;      // relative standard deviation of the skin's smooth mottling
-    double blur_px = 0.8;       // Gaussian sigma of the lens
-    double read_noise = 1.5;    // grey levels
-    double shot_noise = 0.25;   // variance per grey level
+    double skin = 110.0;       // grey level of unshaded skin
+    double gradient = 0.5;     // change of light across the picture, relative
+    double vignetting = 0.3;   // loss of light at the corners
+    double texture = 0.06;     // relative standard deviation of the skin's smooth mottling
+    double blur_px = 0.8;      // Gaussian sigma of the lens
+    double read_noise = 1.5;   // grey levels
+    double shot_noise = 0.25;  // variance per grey level
 };
 
 // What a face has besides dots.
 struct SceneClutter {
-    int lines = 0;     // lids, lips, wrinkles: dark arcs 1.5 to 4 px wide
-    int hairs = 0;     // bundles of thin strands
-    int patches = 0;   // eyes, nostrils, teeth: sharp ellipses three times a dot and more, dark or bright
-    int shadows = 0;   // soft, without an edge
+    int lines = 0;    // lids, lips, wrinkles: dark arcs 1.5 to 4 px wide
+    int hairs = 0;    // bundles of thin strands
+    int patches = 0;  // eyes, nostrils, teeth: sharp ellipses three times a dot and more, dark or bright
+    int shadows = 0;  // soft, without an edge
     bool silhouette = false;  // the right part is far behind, black
 };
 
@@ -52,7 +53,8 @@ struct Picture {
     int height_px = 0;
     std::vector<std::uint8_t> pixels;
     [[nodiscard]] ImageView view() const {
-        return {.pixels = pixels.data(), .width_px = width_px, .height_px = height_px, .stride_bytes = width_px};
+        return {
+            .pixels = pixels.data(), .width_px = width_px, .height_px = height_px, .stride_bytes = width_px};
     }
 };
 

@@ -53,7 +53,8 @@ MatchCounts match(std::span<const TrueDot> truth, std::span<const SeenDot> seen)
 
 std::vector<SeenDot> seen_dots(const Observations& observations) {
     std::vector<SeenDot> seen;
-    for (const Observation& o : observations) seen.push_back({static_cast<double>(o.x_px), static_cast<double>(o.y_px)});
+    for (const Observation& o : observations)
+        seen.push_back({static_cast<double>(o.x_px), static_cast<double>(o.y_px)});
     return seen;
 }
 

@@ -23,11 +23,11 @@ struct SeenDot {
 
 // Counts add up over pictures with +=.
 struct MatchCounts {
-    std::size_t expected = 0;        // dots that should be found
+    std::size_t expected = 0;  // dots that should be found
     std::size_t expected_found = 0;
     std::size_t seen = 0;
-    std::size_t right = 0;           // sightings of a dot, expected or not; each dot once
-    double square_error_px2 = 0.0;   // sum over `right`
+    std::size_t right = 0;          // sightings of a dot, expected or not; each dot once
+    double square_error_px2 = 0.0;  // sum over `right`
     double largest_error_px = 0.0;
 
     MatchCounts& operator+=(const MatchCounts& other);

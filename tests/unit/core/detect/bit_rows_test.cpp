@@ -103,10 +103,12 @@ TEST(BitRows, HolesAreWhatTheOutsideCannotReach) {
         while (!stack.empty()) {
             const int at = stack.back();
             stack.pop_back();
-            visit(at % 64 + 1, at / 64), visit(at % 64 - 1, at / 64), visit(at % 64, at / 64 + 1), visit(at % 64, at / 64 - 1);
+            visit(at % 64 + 1, at / 64), visit(at % 64 - 1, at / 64), visit(at % 64, at / 64 + 1),
+                visit(at % 64, at / 64 - 1);
         }
         for (int y = 0; y < height; ++y) {
-            for (int x = 0; x < width; ++x) ASSERT_EQ(bit(filled, x, y), outside[static_cast<std::size_t>(y * 64 + x)] == 0);
+            for (int x = 0; x < width; ++x)
+                ASSERT_EQ(bit(filled, x, y), outside[static_cast<std::size_t>(y * 64 + x)] == 0);
         }
     }
 }

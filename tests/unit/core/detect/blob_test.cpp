@@ -29,7 +29,8 @@ Blob measure(const std::vector<std::uint8_t>& pixels, Side side, int level, cons
             if (!inside(x)) continue;
             const int begin = x;
             while (x < kSide && inside(x)) ++x;
-            runs.push_back({static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(x)});
+            runs.push_back({static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(begin),
+                            static_cast<std::uint16_t>(x)});
             component.left = std::min(component.left, static_cast<std::uint16_t>(begin));
             component.right = std::max(component.right, static_cast<std::uint16_t>(x - 1));
             component.top = std::min(component.top, static_cast<std::uint16_t>(y));
@@ -39,16 +40,24 @@ Blob measure(const std::vector<std::uint8_t>& pixels, Side side, int level, cons
     }
     component.count = static_cast<std::uint32_t>(runs.size());
     const auto workspace = std::make_unique<BlobWorkspace>();
-    return measure_blob({.pixels = pixels.data(), .width_px = kSide, .height_px = kSide, .stride_bytes = kSide}, side, component,
-                        runs, limits, *workspace);
+    return measure_blob(
+        {.pixels = pixels.data(), .width_px = kSide, .height_px = kSide, .stride_bytes = kSide}, side,
+        component, runs, {}, limits, *workspace);
 }
 
 test::Scene one_dot(double x, double y, double long_px, double short_px) {
     test::Scene scene;
     scene.width_px = kSide;
     scene.height_px = kSide;
-    scene.light = {.skin = 120.0, .gradient = 0.0, .vignetting = 0.0, .texture = 0.0, .blur_px = 0.8, .read_noise = 0.0, .shot_noise = 0.0};
-    scene.dots.push_back({.x_px = x, .y_px = y, .long_px = long_px, .short_px = short_px, .angle_rad = 0.6, .paint = 0.2});
+    scene.light = {.skin = 120.0,
+                   .gradient = 0.0,
+                   .vignetting = 0.0,
+                   .texture = 0.0,
+                   .blur_px = 0.8,
+                   .read_noise = 0.0,
+                   .shot_noise = 0.0};
+    scene.dots.push_back(
+        {.x_px = x, .y_px = y, .long_px = long_px, .short_px = short_px, .angle_rad = 0.6, .paint = 0.2});
     return scene;
 }
 
@@ -98,12 +107,18 @@ TEST(Blob, InvertedLightIsTheSameBlob) {
 
 TEST(Blob, RefusalsSayWhy) {
     const BlobLimits large_only{.min_diameter_px = 8.0};
-    EXPECT_EQ(measure(test::render(one_dot(40, 40, 6, 6)).pixels, Side::kBelow, 72, large_only).rejection, Rejection::kSmall);
-    EXPECT_EQ(measure(test::render(one_dot(40, 40, 40, 30)).pixels, Side::kBelow, 72).rejection, Rejection::kLarge);
-    EXPECT_EQ(measure(test::render(one_dot(40, 40, 60, 60)).pixels, Side::kBelow, 72).rejection, Rejection::kLarge);
-    EXPECT_EQ(measure(test::render(one_dot(40, 40, 24, 3)).pixels, Side::kBelow, 80).rejection, Rejection::kElongated);
-    EXPECT_EQ(measure(test::render(one_dot(2, 40, 10, 10)).pixels, Side::kBelow, 72).rejection, Rejection::kEdge);
-    EXPECT_EQ(measure(test::render(one_dot(40, 77, 10, 10)).pixels, Side::kBelow, 72).rejection, Rejection::kEdge);
+    EXPECT_EQ(measure(test::render(one_dot(40, 40, 6, 6)).pixels, Side::kBelow, 72, large_only).rejection,
+              Rejection::kSmall);
+    EXPECT_EQ(measure(test::render(one_dot(40, 40, 40, 30)).pixels, Side::kBelow, 72).rejection,
+              Rejection::kLarge);
+    EXPECT_EQ(measure(test::render(one_dot(40, 40, 60, 60)).pixels, Side::kBelow, 72).rejection,
+              Rejection::kLarge);
+    EXPECT_EQ(measure(test::render(one_dot(40, 40, 24, 3)).pixels, Side::kBelow, 80).rejection,
+              Rejection::kElongated);
+    EXPECT_EQ(measure(test::render(one_dot(2, 40, 10, 10)).pixels, Side::kBelow, 72).rejection,
+              Rejection::kEdge);
+    EXPECT_EQ(measure(test::render(one_dot(40, 77, 10, 10)).pixels, Side::kBelow, 72).rejection,
+              Rejection::kEdge);
 
     test::Scene faint = one_dot(40, 40, 10, 10);
     faint.dots[0].paint = 0.95;

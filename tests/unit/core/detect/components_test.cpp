@@ -28,7 +28,8 @@ std::vector<Run> runs_of(const std::vector<std::string>& rows) {
             if (rows[y][x] != '#') continue;
             const std::size_t begin = x;
             while (x < rows[y].size() && rows[y][x] == '#') ++x;
-            runs.push_back({static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(x)});
+            runs.push_back({static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(begin),
+                            static_cast<std::uint16_t>(x)});
         }
     }
     return runs;
@@ -83,7 +84,10 @@ std::vector<int> plain_labels(const std::vector<std::string>& rows) {
     const int height = static_cast<int>(rows.size());
     const int width = static_cast<int>(rows[0].size());
     std::vector<int> labels(static_cast<std::size_t>(width * height), -1);
-    const auto inside = [&](int x, int y) { return x >= 0 && y >= 0 && x < width && y < height && rows[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] == '#'; };
+    const auto inside = [&](int x, int y) {
+        return x >= 0 && y >= 0 && x < width && y < height &&
+               rows[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] == '#';
+    };
     for (int i = 0; i < width * height; ++i) {
         if (inside(i % width, i / width)) labels[static_cast<std::size_t>(i)] = i;
     }
@@ -134,7 +138,8 @@ TEST(Components, RandomPicturesEqualThePlainLabelling) {
                 }
             }
             ASSERT_EQ(area, component.area_px);
-            ASSERT_EQ(area, static_cast<std::uint32_t>(std::count(labels.begin(), labels.end(), distinct[c])));
+            ASSERT_EQ(area,
+                      static_cast<std::uint32_t>(std::count(labels.begin(), labels.end(), distinct[c])));
         }
     }
 }

@@ -24,7 +24,9 @@ class DetectorTest : public testing::Test {
 };
 
 test::Picture grey(int width, int height, std::uint8_t value) {
-    return {width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value)};
+    return {
+        width, height,
+        std::vector<std::uint8_t>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value)};
 }
 
 TEST_F(DetectorTest, ConfigurationsOutOfRangeAreRefusedByName) {
@@ -36,28 +38,39 @@ TEST_F(DetectorTest, ConfigurationsOutOfRangeAreRefusedByName) {
     };
     constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
     EXPECT_EQ(error_of([](DetectorConfig&) {}), -1);
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.max_diameter_px = kMaxDotDiameterPx + 1.0; }), static_cast<int>(DetectorError::kDiameters));
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.min_diameter_px = 40.0; }), static_cast<int>(DetectorError::kDiameters));
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.min_diameter_px = kNan; }), static_cast<int>(DetectorError::kDiameters));
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.min_contrast = 0.0; }), static_cast<int>(DetectorError::kContrast));
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.relative_contrast = 1.0; }), static_cast<int>(DetectorError::kContrast));
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.max_open = 0.0; }), static_cast<int>(DetectorError::kShape));
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.size_ratio = kNan; }), static_cast<int>(DetectorError::kShape));
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.min_score = 1.5; }), static_cast<int>(DetectorError::kScore));
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.luma_step = -1.0; }), static_cast<int>(DetectorError::kExposure));
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.max_diameter_px = kMaxDotDiameterPx + 1.0; }),
+              static_cast<int>(DetectorError::kDiameters));
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.min_diameter_px = 40.0; }),
+              static_cast<int>(DetectorError::kDiameters));
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.min_diameter_px = kNan; }),
+              static_cast<int>(DetectorError::kDiameters));
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.min_contrast = 0.0; }),
+              static_cast<int>(DetectorError::kContrast));
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.relative_contrast = 1.0; }),
+              static_cast<int>(DetectorError::kContrast));
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.max_open = 0.0; }),
+              static_cast<int>(DetectorError::kShape));
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.size_ratio = kNan; }),
+              static_cast<int>(DetectorError::kShape));
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.min_score = 1.5; }),
+              static_cast<int>(DetectorError::kScore));
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.luma_step = -1.0; }),
+              static_cast<int>(DetectorError::kExposure));
 }
 
 TEST_F(DetectorTest, NoImageAndTooLargeAnImageAreReported) {
     detector->detect({}, observations, report);
     EXPECT_TRUE(report.unprocessable);
     std::uint8_t pixel = 0;
-    detector->detect({.pixels = &pixel, .width_px = 5000, .height_px = 1, .stride_bytes = 5000}, observations, report);
+    detector->detect({.pixels = &pixel, .width_px = 5000, .height_px = 1, .stride_bytes = 5000}, observations,
+                     report);
     EXPECT_TRUE(report.unprocessable);
     EXPECT_TRUE(observations.empty());
 }
 
 TEST_F(DetectorTest, EvenImagesHoldNothing) {
-    for (const std::uint8_t value : {std::uint8_t{0}, std::uint8_t{1}, std::uint8_t{128}, std::uint8_t{254}, std::uint8_t{255}}) {
+    for (const std::uint8_t value :
+         {std::uint8_t{0}, std::uint8_t{1}, std::uint8_t{128}, std::uint8_t{254}, std::uint8_t{255}}) {
         detector->reset();
         detect(grey(640, 480, value));
         EXPECT_TRUE(observations.empty());
@@ -66,7 +79,9 @@ TEST_F(DetectorTest, EvenImagesHoldNothing) {
 }
 
 TEST_F(DetectorTest, ExposureFlagsFollowTheCatalogue) {
-    const auto flagged = [&](ExposureFlag flag) { return (report.exposure & static_cast<std::uint8_t>(flag)) != 0; };
+    const auto flagged = [&](ExposureFlag flag) {
+        return (report.exposure & static_cast<std::uint8_t>(flag)) != 0;
+    };
     detect(grey(64, 64, 100));
     EXPECT_EQ(report.exposure, 0);
     EXPECT_EQ(report.faults, 0U);
@@ -130,7 +145,8 @@ TEST_F(DetectorTest, MoreMarkersThanRoomKeepsTheBestAndSaysSo) {
     scene.dots.clear();
     for (int y = 0; y < 16; ++y) {
         for (int x = 0; x < 21; ++x) {
-            scene.dots.push_back({.x_px = 20.0 + 21 * x, .y_px = 20.0 + 21 * y, .long_px = 8, .short_px = 8, .paint = 0.2});
+            scene.dots.push_back(
+                {.x_px = 20.0 + 21 * x, .y_px = 20.0 + 21 * y, .long_px = 8, .short_px = 8, .paint = 0.2});
         }
     }
     detect(test::render(scene));

@@ -22,7 +22,10 @@ Canvas random_canvas(SeededRandom& random, int width, int height, int extra_stri
     Canvas canvas;
     canvas.bytes.resize(static_cast<std::size_t>(height) * static_cast<std::size_t>(width + extra_stride));
     for (std::uint8_t& byte : canvas.bytes) byte = static_cast<std::uint8_t>(random.bits());
-    canvas.view = {.pixels = canvas.bytes.data(), .width_px = width, .height_px = height, .stride_bytes = width + extra_stride};
+    canvas.view = {.pixels = canvas.bytes.data(),
+                   .width_px = width,
+                   .height_px = height,
+                   .stride_bytes = width + extra_stride};
     return canvas;
 }
 
@@ -50,14 +53,16 @@ TEST(Kernels, BlockMeansAreRoundedMeansOfThePixelsThereAre) {
                         ++count;
                     }
                 }
-                ASSERT_EQ(grid.values[static_cast<std::size_t>(by * grid.width + bx)], (sum + count / 2) / count);
+                ASSERT_EQ(grid.values[static_cast<std::size_t>(by * grid.width + bx)],
+                          (sum + count / 2) / count);
             }
         }
     }
 }
 
 template <class Pick>
-std::vector<std::uint8_t> plain_extreme(const std::vector<std::uint8_t>& values, int width, int height, int radius, Pick pick) {
+std::vector<std::uint8_t> plain_extreme(const std::vector<std::uint8_t>& values, int width, int height,
+                                        int radius, Pick pick) {
     std::vector<std::uint8_t> result;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
@@ -84,8 +89,10 @@ TEST(Kernels, SlidingExtremesEqualThePlainSearch) {
             sliding_max({high, size.width, size.height}, radius);
             sliding_min({low, size.width, size.height}, radius);
             using Byte = std::uint8_t;
-            EXPECT_EQ(high, plain_extreme(values, size.width, size.height, radius, [](Byte a, Byte b) { return std::max(a, b); }));
-            EXPECT_EQ(low, plain_extreme(values, size.width, size.height, radius, [](Byte a, Byte b) { return std::min(a, b); }));
+            EXPECT_EQ(high, plain_extreme(values, size.width, size.height, radius,
+                                          [](Byte a, Byte b) { return std::max(a, b); }));
+            EXPECT_EQ(low, plain_extreme(values, size.width, size.height, radius,
+                                         [](Byte a, Byte b) { return std::min(a, b); }));
         }
     }
 }
@@ -108,14 +115,16 @@ TEST(Kernels, RunsAreExactlyThePixelsBeyondTheThreshold) {
                 if (i > 0 && runs[i].y == runs[i - 1].y) {
                     ASSERT_GT(runs[i].begin, runs[i - 1].end);
                 }
-                for (int x = runs[i].begin; x < runs[i].end; ++x) painted[static_cast<std::size_t>(runs[i].y * size.width + x)] = 1;
+                for (int x = runs[i].begin; x < runs[i].end; ++x)
+                    painted[static_cast<std::size_t>(runs[i].y * size.width + x)] = 1;
             }
             for (int y = 0; y < size.height; ++y) {
                 for (int x = 0; x < size.width; ++x) {
                     const int level = levels.values[static_cast<std::size_t>(y / 4 * levels.width + x / 4)];
                     const int value = canvas.view.row(y)[x];
                     const bool beyond = side == Side::kBelow ? value < level : value > level;
-                    ASSERT_EQ(painted[static_cast<std::size_t>(y * size.width + x)] != 0, beyond) << x << " " << y;
+                    ASSERT_EQ(painted[static_cast<std::size_t>(y * size.width + x)] != 0, beyond)
+                        << x << " " << y;
                 }
             }
         }
@@ -126,7 +135,8 @@ TEST(Kernels, TooManyRunsStopAtARowAndSaySo) {
     constexpr int kWidth = 64;
     std::vector<std::uint8_t> bytes(kWidth * kWidth);
     for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = i % 2 == 0 ? 0 : 200;
-    const ImageView view{.pixels = bytes.data(), .width_px = kWidth, .height_px = kWidth, .stride_bytes = kWidth};
+    const ImageView view{
+        .pixels = bytes.data(), .width_px = kWidth, .height_px = kWidth, .stride_bytes = kWidth};
     std::vector<std::uint8_t> storage(kMaxBlocks);
     BlockGrid levels = block_means(view, storage);
     std::vector<rig::Run> runs(100);
@@ -139,7 +149,8 @@ TEST(Kernels, TooManyRunsStopAtARowAndSaySo) {
 TEST(Kernels, LumaCountsEveryFourthRow) {
     std::vector<std::uint8_t> bytes(8 * 10, 10);
     for (std::size_t x = 0; x < 8; ++x) bytes[4 * 8 + x] = 255;
-    const LumaSums sums = luma_sums({.pixels = bytes.data(), .width_px = 8, .height_px = 10, .stride_bytes = 8});
+    const LumaSums sums =
+        luma_sums({.pixels = bytes.data(), .width_px = 8, .height_px = 10, .stride_bytes = 8});
     EXPECT_EQ(sums.samples, 24U);
     EXPECT_EQ(sums.saturated, 8U);
     EXPECT_EQ(sums.sum, 16U * 10U + 8U * 255U);
@@ -149,8 +160,10 @@ TEST(Kernels, ProcessableMeansPixelsWithinTheLimits) {
     std::uint8_t pixel = 0;
     EXPECT_FALSE(is_processable({}));
     EXPECT_FALSE(is_processable({.pixels = &pixel, .width_px = 0, .height_px = 4, .stride_bytes = 0}));
-    EXPECT_FALSE(is_processable({.pixels = &pixel, .width_px = kMaxImageWidth + 1, .height_px = 1, .stride_bytes = 0}));
-    EXPECT_FALSE(is_processable({.pixels = &pixel, .width_px = 1, .height_px = kMaxImageHeight + 1, .stride_bytes = 0}));
+    EXPECT_FALSE(is_processable(
+        {.pixels = &pixel, .width_px = kMaxImageWidth + 1, .height_px = 1, .stride_bytes = 0}));
+    EXPECT_FALSE(is_processable(
+        {.pixels = &pixel, .width_px = 1, .height_px = kMaxImageHeight + 1, .stride_bytes = 0}));
     EXPECT_TRUE(is_processable({.pixels = &pixel, .width_px = 1, .height_px = 1, .stride_bytes = 1}));
 }
 

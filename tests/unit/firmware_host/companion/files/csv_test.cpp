@@ -74,7 +74,7 @@ INSTANTIATE_TEST_SUITE_P(
                     BadText{"infinite", "a,b\n1,inf\n", "finite"},
                     BadText{"huge", "a,b\n1,1e999\n", "finite"},
                     BadText{"quoted", "a,b\n\"1\",2\n", "bad.csv:2"}),
-    [](const auto& info) { return info.param.label; });
+    [](const auto& row) { return row.param.label; });
 
 TEST(CsvWriter, WritesWhatTheReaderReads) {
     CsvWriter writer{{"frame", "name", "x"}};

@@ -128,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(
                 npy_file("{'descr': '<f4', 'descr': '<f4', 'fortran_order': False, 'shape': (1,)}", kFour),
                 "malformed"},
         BadFile{"unclosed.npy", npy_file("{'descr': '<f4", kFour), "malformed"}),
-    [](const auto& info) { return info.param.name.substr(0, info.param.name.find('.')); });
+    [](const auto& row) { return row.param.name.substr(0, row.param.name.find('.')); });
 
 TEST(Npy, MissingFileIsNamed) {
     const auto result = read_npy<float>("no/such/file.npy");

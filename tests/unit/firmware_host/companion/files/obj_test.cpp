@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(
                     BadText{"long_index", kFour + "f 1 2 99999999999999999999\n", "bad.obj:5"},
                     BadText{"bare_material", "usemtl\n", "usemtl without a name"},
                     BadText{"surface", "cstype bezier\n", "'cstype'"}),
-    [](const auto& info) { return info.param.label; });
+    [](const auto& row) { return row.param.label; });
 
 }  // namespace
 }  // namespace rig::host

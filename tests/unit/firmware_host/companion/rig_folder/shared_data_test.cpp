@@ -13,8 +13,8 @@ namespace rig::host {
 namespace {
 
 TEST(SharedRig, LoadsWhole) {
-    RIG_SHARED_DATA_OR_SKIP(folder, "rig");
-    const auto rig = load_rig(folder);
+    RIG_SHARED_DATA_OR_SKIP(path, "rig");
+    const auto rig = load_rig(path);
     ASSERT_TRUE(rig) << rig.error().message;
     EXPECT_EQ(rig->vertices_mm.size(), 24591U);
     EXPECT_EQ(rig->triangles.size(), 48836U);
@@ -37,16 +37,16 @@ float length(const MarkerMotion& x) {
 class SharedLayout : public testing::TestWithParam<int> {};
 
 TEST_P(SharedLayout, MarkerModelAgreesWithTheFilesBesideIt) {
-    RIG_SHARED_DATA_OR_SKIP(folder, "rig");
+    RIG_SHARED_DATA_OR_SKIP(path, "rig");
     const std::string count = std::to_string(GetParam());
-    const auto rig = load_rig(folder);
+    const auto rig = load_rig(path);
     ASSERT_TRUE(rig) << rig.error().message;
-    const auto layout = load_layout(folder, count, *rig);
+    const auto layout = load_layout(path, count, *rig);
     ASSERT_TRUE(layout) << layout.error().message;
     ASSERT_EQ(layout->markers.size(), static_cast<std::size_t>(GetParam()));
     const MarkerModel model = marker_model(*rig, *layout);
-    const auto basis = read_npy<float>(folder / ("markers_" + count + "_B.npy"));
-    const auto neutral = read_npy<float>(folder / ("markers_" + count + "_neutral.npy"));
+    const auto basis = read_npy<float>(path / ("markers_" + count + "_B.npy"));
+    const auto neutral = read_npy<float>(path / ("markers_" + count + "_neutral.npy"));
     ASSERT_TRUE(basis && neutral);
     ASSERT_EQ(basis->values.size(), model.basis_mm.size());
     ASSERT_EQ(neutral->values.size(), model.neutral_mm.size());
@@ -80,10 +80,10 @@ TEST_P(SharedLayout, MarkerModelAgreesWithTheFilesBesideIt) {
 INSTANTIATE_TEST_SUITE_P(Layouts, SharedLayout, testing::Values(50, 60, 102));
 
 TEST(SharedTake, LoadsWithRateAndNames) {
-    RIG_SHARED_DATA_OR_SKIP(folder, "rig");
-    const auto rig = load_rig(folder);
+    RIG_SHARED_DATA_OR_SKIP(path, "rig");
+    const auto rig = load_rig(path);
     ASSERT_TRUE(rig) << rig.error().message;
-    const auto take = load_take(folder.parent_path() / "takes/alex_rom_3_weights60.csv", *rig);
+    const auto take = load_take(path.parent_path() / "takes/alex_rom_3_weights60.csv", *rig);
     ASSERT_TRUE(take) << take.error().message;
     EXPECT_EQ(take->frame_count, 8063U);
     EXPECT_EQ(take->rate_hz, 60.0);
@@ -92,8 +92,8 @@ TEST(SharedTake, LoadsWithRateAndNames) {
 }
 
 TEST(SharedRig, SavesToTheSameBytes) {
-    RIG_SHARED_DATA_OR_SKIP(folder, "rig");
-    const auto rig = load_rig(folder);
+    RIG_SHARED_DATA_OR_SKIP(path, "rig");
+    const auto rig = load_rig(path);
     ASSERT_TRUE(rig) << rig.error().message;
     const rig::test::TempFolder copy;
     ASSERT_TRUE(save_rig(copy.path(), *rig));
@@ -104,7 +104,7 @@ TEST(SharedRig, SavesToTheSameBytes) {
     EXPECT_EQ(again->triangle_part, rig->triangle_part);
     for (const char* name :
          {"vertices.npy", "triangles.npy", "delta_offsets.npy", "delta_xyz.npy", "blendshapes.txt"}) {
-        EXPECT_EQ(std::filesystem::file_size(folder / name), std::filesystem::file_size(copy / name)) << name;
+        EXPECT_EQ(std::filesystem::file_size(path / name), std::filesystem::file_size(copy / name)) << name;
     }
 }
 

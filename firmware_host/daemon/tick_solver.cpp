@@ -1,0 +1,56 @@
+#include "firmware_host/daemon/tick_solver.hpp"
+
+namespace rig {
+
+TickSolver::TickSolver(const TickSolverParts& parts) : parts_(parts) {
+    if (parts_.pack != nullptr) gate_.configure(parts_.pack->weight_low, parts_.pack->weight_high);
+}
+
+void TickSolver::tick(const FrameSet& frames, FaultMap faults, TickOutput& output) {
+    const bool reset = reset_wanted_.exchange(false, std::memory_order_relaxed);
+    if (reset) parts_.pipeline.reset_tracking();
+    const std::int64_t began_us = parts_.wall.now_us();
+    parts_.pipeline.step(frames, state_, report_);
+    const std::int64_t solve_us = parts_.wall.now_us() - began_us;
+    record(frames, reset);
+    static_cast<void>(gate_.pass(state_));
+    digest_.add(state_);
+    state_.faults |= faults;
+    if (static_cast<double>(solve_us) * parts_.rate_hz > 1e6) state_.faults |= fault_bit(Fault::kOverrun);
+    count(frames, report_, solve_us);
+    output.state = state_;
+    output.markers = marker_frame(parts_.pipeline.named_markers(), state_.sequence);
+    output.health = health_;
+}
+
+void TickSolver::record(const FrameSet& frames, bool reset_before) {
+    if (parts_.log == nullptr) return;
+    ObservationTick tick;
+    tick.number = state_.sequence;
+    tick.capture_us = frames.capture_us;
+    tick.reset_before = reset_before;
+    tick.status = state_.cameras;
+    for (std::size_t c = 0; c < kMaxCameras; ++c) tick.cameras[c] = parts_.pipeline.observations(c).span();
+    parts_.log->append(tick);
+}
+
+void TickSolver::count(const FrameSet& frames, const FrameReport& report, std::int64_t solve_us) {
+    solve_times_.add(solve_us);
+    static_cast<void>(faults_.look(state_.faults));
+    ++health_.ticks;
+    ++(report.solved ? health_.solved : health_.held);
+    if ((state_.faults & fault_bit(Fault::kOverrun)) != 0) ++health_.overruns;
+    for (std::size_t c = 0; c < frames.camera_count; ++c) {
+        ++(frames.images[c].empty() ? health_.camera_missing[c] : health_.camera_good[c]);
+    }
+    health_.observations = report.observations;
+    health_.markers_seen = report.markers_seen;
+    health_.swaps_repaired += report.swaps_repaired;
+    health_.bootstraps += report.bootstrapped ? 1 : 0;
+    health_.solve = solve_times_.spread();
+    health_.state = state_.state;
+    health_.faults = state_.faults;
+    health_.fault_counts = faults_.counts();
+}
+
+}  // namespace rig

@@ -1,0 +1,59 @@
+// One tick: pictures in, a state that may be sent out, with its report and wear. The only caller of the
+// pipeline.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "core/pipeline/pipeline.hpp"
+#include "core/wire/health.hpp"
+#include "core/wire/state_messages.hpp"
+#include "firmware_host/take_log/observation_log.hpp"
+#include "firmware_host/daemon/output_gate.hpp"
+#include "firmware_host/take_log/stream_digest.hpp"
+#include "firmware_host/daemon/wear.hpp"
+#include "hal/clock.hpp"
+
+namespace rig {
+
+// What a tick hands to the link.
+struct TickOutput {
+    FaceState state;
+    MarkerFrame markers;
+    Health health;  // without the link's part
+};
+
+struct TickSolverParts {
+    Pipeline& pipeline;
+    const Clock& wall;  // for how long a solve takes; in lockstep the rig's own clock stands still meanwhile
+    ObservationLogWriter* log = nullptr;  // may be none
+    const SolvePack* pack = nullptr;      // none: the pipeline is in SAFE
+    double rate_hz = 60.0;
+};
+
+class TickSolver {
+  public:
+    explicit TickSolver(const TickSolverParts& parts);
+    // `faults`: found on the way of the pictures here.
+    void tick(const FrameSet& frames, FaultMap faults, TickOutput& output);
+    // Any thread: before the next tick tracking begins anew.
+    void request_reset() { reset_wanted_.store(true, std::memory_order_relaxed); }
+    [[nodiscard]] const StreamDigest& digest() const { return digest_; }
+    [[nodiscard]] const Health& health() const { return health_; }
+
+  private:
+    void record(const FrameSet& frames, bool reset_before);
+    void count(const FrameSet& frames, const FrameReport& report, std::int64_t solve_us);
+
+    TickSolverParts parts_;
+    std::atomic<bool> reset_wanted_{false};
+    OutputGate gate_;
+    StreamDigest digest_;
+    FaceState state_;
+    FrameReport report_;
+    Health health_;
+    FaultBook faults_;
+    TimeBook solve_times_;
+};
+
+}  // namespace rig

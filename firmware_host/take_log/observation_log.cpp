@@ -1,0 +1,187 @@
+#include "firmware_host/take_log/observation_log.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/wire/crc32c.hpp"
+
+namespace rig {
+
+namespace {
+
+constexpr std::array<char, 4> kMagic{'R', 'G', 'O', '1'};
+constexpr std::uint16_t kVersion = 1;
+constexpr std::uint8_t kFilterBit = 1;
+constexpr std::uint8_t kStabiliseBit = 2;
+constexpr std::uint8_t kResetBit = 1;
+constexpr std::uint8_t kLastStatus = static_cast<std::uint8_t>(CameraStatus::kExposure);
+
+void write_header(const ObservationLogHeader& header, MutableByteSpan into) {
+    ByteWriter writer(into);
+    writer.write(kMagic);
+    writer.write(kVersion);
+    writer.write(header.camera_count);
+    writer.write(std::uint8_t{0});
+    writer.write(header.rate_millihertz);
+    writer.write(static_cast<std::uint8_t>((header.filter ? kFilterBit : 0) |
+                                           (header.stabilise ? kStabiliseBit : 0) | header.loss_policy << 2));
+    writer.write(std::array<std::uint8_t, 3>{});
+    writer.write(header.pack_hash);
+    writer.write(std::array<std::uint8_t, 16>{});
+    RIG_CHECK(writer.ok() && writer.size() == kObservationLogHeaderBytes);
+}
+
+std::size_t write_record(const ObservationTick& tick, std::uint8_t camera_count, MutableByteSpan into) {
+    ByteWriter writer(into);
+    writer.write(std::uint32_t{0});
+    writer.write(tick.number);
+    writer.write(tick.capture_us);
+    writer.write(static_cast<std::uint8_t>(tick.reset_before ? kResetBit : 0));
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+        writer.write(c < camera_count ? tick.status[c] : CameraStatus::kUnused);
+    }
+    writer.write(std::array<std::uint8_t, 3>{});
+    for (std::size_t c = 0; c < camera_count; ++c) {
+        const std::size_t count = std::min(tick.cameras[c].size(), kMaxObservations);
+        writer.write(static_cast<std::uint16_t>(count));
+        for (const Observation& o : tick.cameras[c].first(count)) {
+            writer.write(std::array<float, 5>{o.x_px, o.y_px, o.diameter_px, o.contrast, o.score});
+        }
+    }
+    RIG_CHECK(writer.ok());
+    store(into, 0, static_cast<std::uint32_t>(writer.size() + sizeof(std::uint32_t)));
+    writer.write(crc32c(writer.written()));
+    RIG_CHECK(writer.ok());
+    return writer.size();
+}
+
+}  // namespace
+
+ObservationLogWriter::ObservationLogWriter(std::unique_ptr<std::FILE, FileCloser> file,
+                                           std::uint8_t camera_count)
+    : file_(std::move(file)),
+      camera_count_(camera_count),
+      buffer_(kBufferBytes),
+      record_(kMaxObservationRecordBytes) {}
+
+ObservationLogWriter::~ObservationLogWriter() {
+    static_cast<void>(drain());
+}
+
+Result<std::unique_ptr<ObservationLogWriter>, ObservationLogError> ObservationLogWriter::create(
+    const std::string& path, const ObservationLogHeader& header) {
+    std::unique_ptr<std::FILE, FileCloser> file(std::fopen(path.c_str(), "wb"));
+    if (file == nullptr) return failure(ObservationLogError::kOpen);
+    // The buffer is ours: with the library's own, a write after seal() could allocate.
+    if (std::setvbuf(file.get(), nullptr, _IONBF, 0) != 0) return failure(ObservationLogError::kOpen);
+    std::array<std::byte, kObservationLogHeaderBytes> head{};
+    write_header(header, head);
+    if (std::fwrite(head.data(), 1, head.size(), file.get()) != head.size())
+        return failure(ObservationLogError::kOpen);
+    return std::unique_ptr<ObservationLogWriter>(
+        new ObservationLogWriter(std::move(file), header.camera_count));
+}
+
+void ObservationLogWriter::append(const ObservationTick& tick) {
+    const std::size_t length = write_record(tick, camera_count_, record_);
+    const std::uint64_t written = written_.load(std::memory_order_relaxed);
+    const std::uint64_t waiting = written - drained_.load(std::memory_order_acquire);
+    if (failed_.load(std::memory_order_relaxed) || length > kBufferBytes - waiting) {
+        dropped_.fetch_add(1, std::memory_order_relaxed);
+        return;
+    }
+    const auto at = static_cast<std::size_t>(written % kBufferBytes);
+    const std::size_t until_wrap = std::min(length, kBufferBytes - at);
+    std::copy_n(record_.begin(), until_wrap, buffer_.begin() + static_cast<std::ptrdiff_t>(at));
+    std::copy_n(record_.begin() + static_cast<std::ptrdiff_t>(until_wrap), length - until_wrap,
+                buffer_.begin());
+    written_.store(written + length, std::memory_order_release);
+}
+
+bool ObservationLogWriter::drain() {
+    const std::uint64_t written = written_.load(std::memory_order_acquire);
+    std::uint64_t drained = drained_.load(std::memory_order_relaxed);
+    while (drained < written && !failed_.load(std::memory_order_relaxed)) {
+        const auto at = static_cast<std::size_t>(drained % kBufferBytes);
+        const auto part =
+            static_cast<std::size_t>(std::min<std::uint64_t>(written - drained, kBufferBytes - at));
+        if (std::fwrite(buffer_.data() + at, 1, part, file_.get()) != part) failed_ = true;
+        drained += part;
+        drained_.store(drained, std::memory_order_release);
+    }
+    return !failed_.load(std::memory_order_relaxed);
+}
+
+Result<ObservationLogReader, ObservationLogError> ObservationLogReader::open(ByteSpan bytes) {
+    if (bytes.size() < kObservationLogHeaderBytes) return failure(ObservationLogError::kCut);
+    ObservationLogReader log(bytes);
+    ByteReader reader(bytes.first(kObservationLogHeaderBytes));
+    const auto magic = reader.read<std::array<char, 4>>();
+    const auto version = reader.read<std::uint16_t>();
+    log.header_.camera_count = reader.read<std::uint8_t>();
+    const auto reserved = reader.read<std::uint8_t>();
+    log.header_.rate_millihertz = reader.read<std::uint32_t>();
+    const auto flags = reader.read<std::uint8_t>();
+    const auto padding = reader.read<std::array<std::uint8_t, 3>>();
+    log.header_.pack_hash = reader.read<std::array<std::byte, 32>>();
+    const auto tail = reader.read<std::array<std::uint8_t, 16>>();
+    log.header_.filter = (flags & kFilterBit) != 0;
+    log.header_.stabilise = (flags & kStabiliseBit) != 0;
+    log.header_.loss_policy = flags >> 2;
+    const bool known = magic == kMagic && version == kVersion && log.header_.camera_count >= 1 &&
+                       log.header_.camera_count <= kMaxCameras && log.header_.rate_millihertz > 0 &&
+                       log.header_.rate_millihertz <= 1'000'000 && log.header_.loss_policy <= 1 &&
+                       reserved == 0 && padding == std::array<std::uint8_t, 3>{} &&
+                       tail == std::array<std::uint8_t, 16>{};
+    if (!known) return failure(ObservationLogError::kFormat);
+    return log;
+}
+
+bool ObservationLogReader::read_observations(ByteReader& reader, ObservationTick& tick) {
+    for (std::size_t c = 0; c < header_.camera_count; ++c) {
+        const auto count = reader.read<std::uint16_t>();
+        if (count > kMaxObservations) return false;
+        const std::span<Observation> place = std::span(observations_).subspan(c * kMaxObservations, count);
+        for (Observation& observation : place) {
+            const auto numbers = reader.read<std::array<float, 5>>();
+            for (const float number : numbers) {
+                if (!std::isfinite(number)) return false;
+            }
+            observation = {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]};
+        }
+        tick.cameras[c] = place;
+    }
+    return reader.ok() && reader.remaining() == 0;
+}
+
+Result<ObservationTick, ObservationLogError> ObservationLogReader::next() {
+    RIG_CHECK(!at_end());
+    const ByteSpan rest = bytes_.subspan(position_);
+    if (rest.size() < sizeof(std::uint32_t)) return failure(ObservationLogError::kCut);
+    const auto length = load<std::uint32_t>(rest, 0);
+    if (length < kObservationRecordHeadBytes + sizeof(std::uint32_t) || length > kMaxObservationRecordBytes) {
+        return failure(ObservationLogError::kDamaged);
+    }
+    if (length > rest.size()) return failure(ObservationLogError::kCut);
+    const ByteSpan record = rest.first(length - sizeof(std::uint32_t));
+    if (load<std::uint32_t>(rest, record.size()) != crc32c(record))
+        return failure(ObservationLogError::kDamaged);
+    ByteReader reader(record.subspan(sizeof(std::uint32_t)));
+    ObservationTick tick;
+    tick.number = reader.read<std::uint32_t>();
+    tick.capture_us = reader.read<std::int64_t>();
+    const auto flags = reader.read<std::uint8_t>();
+    const auto statuses = reader.read<std::array<std::uint8_t, kMaxCameras>>();
+    const auto padding = reader.read<std::array<std::uint8_t, 3>>();
+    tick.reset_before = (flags & kResetBit) != 0;
+    bool sound = flags <= kResetBit && padding == std::array<std::uint8_t, 3>{};
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+        sound = sound && statuses[c] <= kLastStatus;
+        tick.status[c] = static_cast<CameraStatus>(sound ? statuses[c] : 0);
+    }
+    if (!sound || !read_observations(reader, tick)) return failure(ObservationLogError::kDamaged);
+    position_ += length;
+    return tick;
+}
+
+}  // namespace rig
