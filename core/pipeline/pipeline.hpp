@@ -21,7 +21,7 @@ namespace rig {
 
 enum class PipelineError : std::uint8_t { kPackLimits, kRate };
 
-// About 30 MB, all of it inside the object: a program places it before seal(), never on a stack. step() and idle() never
+// About 11 MB, all of it inside the object: a program places it before seal(), never on a stack. step() and idle() never
 // allocate. The pack's bytes outlive it. One thread uses a pipeline.
 class Pipeline {
   public:

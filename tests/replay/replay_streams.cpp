@@ -113,7 +113,8 @@ ReplayStream read_stream(const std::filesystem::path& file) {
     }
     if (file.filename() == "unlabelled.npy") {
         stream.unlabelled = true;
-        stream.truth = read_or_throw<std::int32_t>(file.parent_path() / "unlabelled_id.npy").values;
+        const auto ids = read_or_throw<std::int16_t>(file.parent_path() / "unlabelled_id.npy");
+        stream.truth.assign(ids.values.begin(), ids.values.end());
     }
     return stream;
 }

@@ -70,7 +70,8 @@ LinkSession::End LinkSession::run(const std::function<bool()>& done, double time
     const std::unique_ptr<Clock> clock = host_clock();
     constexpr double kForever_s = 1.0e9;
     const std::int64_t end_us =
-        clock->now_us() + static_cast<std::int64_t>((timeout_s < kForever_s ? timeout_s : kForever_s) * 1.0e6);
+        clock->now_us() +
+        static_cast<std::int64_t>((timeout_s < kForever_s ? timeout_s : kForever_s) * 1.0e6);
     while (true) {
         const std::int64_t now_us = clock->now_us();
         session_.poll(now_us);

@@ -61,7 +61,8 @@ void take_state(Taking& taking, const ReceivedState& received) {
         return;
     }
     taking.sequences.push_back(received.state.sequence);
-    if (received.latency_us) taking.latencies_us.push_back(*received.latency_us);
+    // A held state's capture is old by design; its age says so.
+    if (received.latency_us && !received.state.held) taking.latencies_us.push_back(*received.latency_us);
 }
 
 void take_markers(Taking& taking, const MarkerFrame& frame) {

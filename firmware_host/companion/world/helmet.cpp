@@ -122,7 +122,7 @@ std::vector<HelmetCamera> default_helmet(std::size_t camera_count) {
         cameras = {aimed("a", {0.0, -48.0, 232.0}, target)};
     } else {
         cameras = {aimed("a", {-45.0, -48.0, 228.0}, target), aimed("b", {45.0, -48.0, 228.0}, target)};
-        if (camera_count >= 3) cameras.push_back(aimed("c", {0.0, -105.0, 218.0}, target));
+        if (camera_count >= 3) cameras.push_back(aimed("c", {0.0, -100.0, 228.0}, target));
         if (camera_count >= 4) cameras.push_back(aimed("d", {0.0, 30.0, 228.0}, target));
     }
     // No two lenses are alike; the spread is that of the reference images' single lens.

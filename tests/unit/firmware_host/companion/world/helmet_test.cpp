@@ -32,8 +32,8 @@ TEST(Helmet, SeesWhatTheFormulaSays) {
 TEST(Helmet, SlopeOfAPixelUndoesTheLens) {
     for (const double k1 : {-0.2, -0.11, 0.0, 0.15}) {
         const HelmetCamera camera = rig::test::straight_camera(k1, 0.02);
-        for (const double x : {0.0, 31.7, 78.3, 159.0}) {
-            for (const double y : {0.0, 81.6, 140.2}) {
+        for (const double x : {0.0, 31.7, 126.3, 255.0}) {
+            for (const double y : {0.0, 129.6, 240.2}) {
                 const RaySlope slope = slope_of_pixel(camera, x, y);
                 const PixelAt back =
                     see(camera, camera.centre_mm + Vec3d{100.0 * slope.x, -100.0 * slope.y, -100.0});

@@ -50,7 +50,7 @@ TEST(ImageWriter, CamerasAndTruthAgreeByThePublishedFormula) {
         const std::string name = entry.at("image");
         const auto image = read_grey_image(folder / name);
         ASSERT_TRUE(image) << image.error().message;
-        EXPECT_EQ(image->width_px, 160);
+        EXPECT_EQ(image->width_px, 256);
         for (int m = 0; m < 9; ++m) {
             ASSERT_TRUE(*rows->next());
             EXPECT_EQ(std::string(rows->fields()[0]) + ".pgm", name);

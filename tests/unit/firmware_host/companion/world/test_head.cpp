@@ -77,11 +77,11 @@ TestHead flat_head(bool plate) {
 host::HelmetCamera straight_camera(double k1, double k2) {
     host::HelmetCamera camera;
     camera.name = "a";
-    camera.width_px = 160;
-    camera.height_px = 160;
-    camera.f_px = 240.0;
-    camera.cx_px = 78.3;
-    camera.cy_px = 81.6;
+    camera.width_px = 256;
+    camera.height_px = 256;
+    camera.f_px = 600.0;
+    camera.cx_px = 126.3;
+    camera.cy_px = 129.6;
     camera.k1 = k1;
     camera.k2 = k2;
     camera.rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1};

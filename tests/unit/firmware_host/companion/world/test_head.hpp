@@ -17,7 +17,7 @@ struct TestHead {
 };
 [[nodiscard]] TestHead flat_head(bool plate = false);
 
-// One straight-on camera, 230 mm in front of the sheet, 160 x 160 px; k1, k2 as given.
+// One straight-on camera, 230 mm in front of the sheet, 256 x 256 px, 2.6 px a millimetre; k1, k2 as given.
 [[nodiscard]] host::HelmetCamera straight_camera(double k1 = 0.0, double k2 = 0.0);
 
 // Dies with the fault when the world cannot be made.

@@ -161,11 +161,13 @@ TEST(World, ARealHeadsMarkersAreTheRecordedOnes) {
     ASSERT_TRUE(world) << world.error().message;
     for (std::size_t frame = 0; frame < 1200; frame += 97) {
         const FrameTruth truth = (*world)->truth(frame);
+        // The recording used the whole basis; the rig's files leave deltas under 0.005 mm out of every shape.
+        double left_out_mm = 1e-4;
+        for (const float w : truth.weights) left_out_mm += 0.005 * static_cast<double>(w);
         for (std::size_t m = 0; m < 60; ++m) {
             for (std::size_t k = 0; k < 3; ++k) {
-                // The recorded basis leaves out deltas under 0.005 mm; the rest is rounding of files.
-                EXPECT_NEAR(truth.headset_mm[m][k],
-                            static_cast<double>(recorded->values[(frame * 60 + m) * 3 + k]), 2e-3);
+                const auto expected = static_cast<double>(recorded->values[(frame * 60 + m) * 3 + k]);
+                EXPECT_NEAR(truth.headset_mm[m][k], expected, left_out_mm);
             }
         }
     }
