@@ -64,7 +64,7 @@ int run_replay(const ReplayOptions& options) {
 
 void add_replay_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<ReplayOptions>();
-    CLI::App* verb = app.add_subcommand("replay", "solve a take again from the observations recorded on the rig");
+    CLI::App* verb = app.add_subcommand("replay", "Solve a take again from the observations recorded on the rig");
     verb->add_option("log", options->log, "observation log of `headrigd --log-observations`")->required()->type_name("FILE.rgo");
     verb->add_option("--pack", options->pack, "the pack it was recorded with")->required()->type_name("FILE");
     verb->add_option("--out", options->weights_csv, "weights: frame,time_s,<shapes>")->type_name("W.csv");
