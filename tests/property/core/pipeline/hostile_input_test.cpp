@@ -179,11 +179,16 @@ void step_images(Victim& v, std::int64_t at_us) {
 
 void step_any(Victim& v, std::int64_t at_us, std::span<const Vec3> good) {
     switch (v.random.below(5)) {
-        case 0: return step_labelled(v, at_us, good);
-        case 1: return step_points(v, at_us, good);
-        case 2: return step_observations(v, at_us, good);
-        case 3: return step_images(v, at_us);
-        default: return v.pipeline.idle(at_us, v.state, v.report);
+        case 0:
+            return step_labelled(v, at_us, good);
+        case 1:
+            return step_points(v, at_us, good);
+        case 2:
+            return step_observations(v, at_us, good);
+        case 3:
+            return step_images(v, at_us);
+        default:
+            return v.pipeline.idle(at_us, v.state, v.report);
     }
 }
 

@@ -40,7 +40,8 @@ TEST(WritePack, OpensWhateverTheLengthOfItsName) {
             PackIdentity identity;
             identity.name = std::string(length, 'n');
             const auto opened = open_pack_copy(write_pack(sample.view, identity, sha256), "named");
-            ASSERT_TRUE(opened.has_value()) << length << " bytes, " << int{cameras} << " cameras: " << opened.error().message;
+            ASSERT_TRUE(opened.has_value())
+                << length << " bytes, " << int{cameras} << " cameras: " << opened.error().message;
         }
     }
 }
