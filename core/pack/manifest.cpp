@@ -59,10 +59,12 @@ CameraModel camera_from(const fb::Camera& stored) {
     return camera;
 }
 
-// The verifier of FlatBuffers sees to the alignment of a vector's length, not to that of its structs.
+// The verifier of FlatBuffers sees to the alignment of a vector's length, not to that of its structs. An
+// empty one has none to align.
 template <class T>
 bool is_aligned(const flatbuffers::Vector<const T*>* structs) {
-    return structs == nullptr || reinterpret_cast<std::uintptr_t>(structs->Data()) % alignof(T) == 0;
+    return structs == nullptr || structs->size() == 0 ||
+           reinterpret_cast<std::uintptr_t>(structs->Data()) % alignof(T) == 0;
 }
 
 Result<void, PackError> read_identity(const fb::Manifest& stored, PackManifest& out) {

@@ -14,9 +14,9 @@ namespace rig::test {
 }  // namespace rig::test
 
 // Declares `path` in a test body, or skips the test with the reason. Needs <gtest/gtest.h>.
-#define RIG_SHARED_DATA_OR_SKIP(variable, relative)                                                              \
-    const std::filesystem::path variable = ::rig::test::shared_data(relative);                                  \
-    if (variable.empty()) {                                                                                   \
+#define RIG_SHARED_DATA_OR_SKIP(variable, relative)                                                          \
+    const std::filesystem::path variable = ::rig::test::shared_data(relative);                               \
+    if (variable.empty()) {                                                                                  \
         GTEST_SKIP() << "needs " << (relative) << " of ../shared/data (or set RIG_SHARED_DATA to a folder)"; \
     }                                                                                                        \
     static_cast<void>(0)

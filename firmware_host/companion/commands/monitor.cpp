@@ -109,7 +109,7 @@ int run_monitor(const MonitorOptions& options) {
 
 void add_monitor_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<MonitorOptions>();
-    CLI::App* verb = app.add_subcommand("monitor", "live bars of weights and health in the terminal");
+    CLI::App* verb = app.add_subcommand("monitor", "Live bars of weights and health in the terminal");
     add_link_option(*verb, options->link)->required();
     verb->add_option("--seconds", options->seconds, "end after this time; default: Ctrl-C")
         ->check(CLI::Range(0.1, kForever_s))

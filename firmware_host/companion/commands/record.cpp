@@ -224,7 +224,7 @@ int run_record(const RecordOptions& options) {
 
 void add_record_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<RecordOptions>();
-    CLI::App* verb = app.add_subcommand("record", "write what a rig streams into files");
+    CLI::App* verb = app.add_subcommand("record", "Write what a rig streams into files");
     add_link_option(*verb, options->link)->required();
     verb->add_option("-o,--out", options->out, "weights: frame,time_s,<shape names>")
         ->required()

@@ -107,21 +107,28 @@ int tiles_across(const PixelGrid& grid) {
     return (grid.width_px() + kTile_px - 1) / kTile_px;
 }
 
-// The part of a tile beyond the image is never covered, so tiles at the rim hide nothing unless they are
+// Least inverse depth of each tile; 0 outside of the drawn rows and columns, where nothing hides anything.
+// The part of a tile beyond the image is never covered, so a tile at the rim hides nothing unless it is
 // whole.
-void measure_cover(const PixelGrid& grid, std::vector<float>& cover) {
+void measure_cover(const PixelGrid& grid, const SeenSurface& drawn, std::vector<float>& cover) {
     const int across = tiles_across(grid);
     const int down = (grid.height_px() + kTile_px - 1) / kTile_px;
-    cover.assign(static_cast<std::size_t>(across) * static_cast<std::size_t>(down),
-                 std::numeric_limits<float>::max());
-    for (int y = 0; y < grid.height_px(); ++y) {
-        float* tiles =
-            cover.data() + static_cast<std::size_t>(y / kTile_px) * static_cast<std::size_t>(across);
-        const PixelGroup* groups = grid.row(y);
-        for (int x = 0; x < grid.width_px(); x += kWide) {
-            float& tile = tiles[x / kTile_px];
-            for (const float nearness : groups[x / kWide].inverse_depth)
-                tile = nearness < tile ? nearness : tile;
+    cover.assign(static_cast<std::size_t>(across) * static_cast<std::size_t>(down), 0.0F);
+    for (int row = drawn.first_row / kTile_px; row < drawn.end_row / kTile_px; ++row) {
+        for (int column = drawn.first_column / kTile_px;
+             column < (drawn.end_column + kTile_px - 1) / kTile_px; ++column) {
+            std::array<float, kWide> least_of = {1.0F, 1.0F, 1.0F, 1.0F};  // nothing is nearer than 1 mm
+            for (int y = row * kTile_px; y < (row + 1) * kTile_px; ++y) {
+                const PixelGroup* groups = grid.row(y);
+                const int end = std::min((column + 1) * kTile_px, grid.width_px());
+                for (int x = column * kTile_px; x < end; x += kWide) {
+                    const auto& depth = groups[x / kWide].inverse_depth;
+                    for (std::size_t k = 0; k < kWide; ++k)
+                        least_of[k] = depth[k] < least_of[k] ? depth[k] : least_of[k];
+                }
+            }
+            cover[static_cast<std::size_t>(row * across + column)] =
+                std::min({least_of[0], least_of[1], least_of[2], least_of[3]});
         }
     }
 }
@@ -153,14 +160,29 @@ PixelGrid::PixelGrid(const HelmetCamera& camera)
             group.y[lane] = inside ? static_cast<float>(camera.f_px * slope.y) : kNowhere;
         }
     }
+    note_drawn(0, width_px_, 0, height_px_);
     clear();
 }
 
 void PixelGrid::clear() {
-    for (PixelGroup& group : groups_) {
-        group.inverse_depth.fill(0.0F);
-        group.plane.fill(kNothing);
+    for (int y = first_row_; y < end_row_; ++y) {
+        PixelGroup* groups = row(y);
+        for (int g = first_column_ / kWide; g < (end_column_ + kWide - 1) / kWide; ++g) {
+            groups[g].inverse_depth.fill(0.0F);
+            groups[g].plane.fill(kNothing);
+        }
     }
+    first_column_ = width_px_;
+    first_row_ = height_px_;
+    end_column_ = 0;
+    end_row_ = 0;
+}
+
+void PixelGrid::note_drawn(int first_column, int end_column, int first_row, int end_row) {
+    first_column_ = std::min(first_column_, first_column);
+    end_column_ = std::max(end_column_, end_column);
+    first_row_ = std::min(first_row_, first_row);
+    end_row_ = std::max(end_row_, end_row);
 }
 
 RIG_WIDE_LOOPS void project(const HelmetCamera& camera, const FaceView& view, const VertexArrays& position_mm,
@@ -215,7 +237,7 @@ RIG_WIDE_LOOPS void rasterise(std::span<const Int3> triangles, std::size_t front
     surface.end_row = 0;
     const int across = tiles_across(grid);
     for (std::size_t t = 0; t < triangles.size(); ++t) {
-        if (t == front_count) measure_cover(grid, surface.cover);
+        if (t == front_count) measure_cover(grid, surface, surface.cover);
         const std::array<std::size_t, 3> v = {static_cast<std::size_t>(triangles[t][0]),
                                               static_cast<std::size_t>(triangles[t][1]),
                                               static_cast<std::size_t>(triangles[t][2])};
@@ -253,6 +275,7 @@ RIG_WIDE_LOOPS void rasterise(std::span<const Int3> triangles, std::size_t front
         surface.end_row = std::max(surface.end_row, box.end_row);
     }
     if (surface.planes.empty()) surface.first_column = surface.first_row = 0;
+    grid.note_drawn(surface.first_column, surface.end_column, surface.first_row, surface.end_row);
 }
 
 }  // namespace rig::host

@@ -33,7 +33,10 @@ struct IdealPoint {
 class PixelGrid {
   public:
     explicit PixelGrid(const HelmetCamera& camera);
+    // Forgets what was drawn; costs no more than what was drawn since the last time.
     void clear();
+    // Widens what clear() covers.
+    void note_drawn(int first_column, int end_column, int first_row, int end_row);
     [[nodiscard]] int width_px() const { return width_px_; }
     [[nodiscard]] int height_px() const { return height_px_; }
     // Groups of a row; the last may reach beyond the image, where rays are NaN.
@@ -55,6 +58,7 @@ class PixelGrid {
     int height_px_;
     std::size_t stride_;
     std::vector<PixelGroup> groups_;
+    int first_column_ = 0, end_column_ = 0, first_row_ = 0, end_row_ = 0;
 };
 
 // X_cam = rotation X_face + offset_mm: slip and camera in one.

@@ -1,6 +1,7 @@
-// Latency and memory of the solver side of the pipeline, observations in hand to FaceState, in one table: marker streams
-// and helmets of one to four cameras, small to largest rigs. Thread CPU time, so that a busy machine disturbs it less.
-// Detection is measured by bench_vision. Not a test: nothing here fails because a machine is slow.
+// Latency and memory of the solver side of the pipeline, observations in hand to FaceState, in one table:
+// marker streams and helmets of one to four cameras, small to largest rigs. Thread CPU time, so that a busy
+// machine disturbs it less. Detection is measured by bench_vision. Not a test: nothing here fails because a
+// machine is slow.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -40,7 +41,8 @@ double thread_cpu_us() {
 // One tick's input, made before the clock starts.
 class TickInput {
   public:
-    TickInput(const SyntheticFace& face, const Case& c, std::size_t frame, SeededRandom& random) : cameras_(c.cameras) {
+    TickInput(const SyntheticFace& face, const Case& c, std::size_t frame, SeededRandom& random)
+        : cameras_(c.cameras) {
         const double time_s = static_cast<double>(frame) / 60.0;
         points_ = moved(creeping_slip(time_s), face.positions(face.weights_at(time_s)));
         frame_.capture_us = static_cast<std::int64_t>(time_s * 1e6);
@@ -53,7 +55,8 @@ class TickInput {
             frame_.status[camera] = CameraStatus::kGood;
         }
         add_noise(points_, 0.1, random);
-        std::rotate(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(frame % points_.size()), points_.end());
+        std::rotate(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(frame % points_.size()),
+                    points_.end());
     }
     void step(Pipeline& pipeline, FaceState& state, FrameReport& report) const {
         if (cameras_ > 0) {
@@ -110,7 +113,8 @@ void print_memory() {
     row("of it: detectors, four cameras", kMaxCameras * sizeof(Detector));
     row("tracker state and workspace", sizeof(TrackerState) + sizeof(TrackerWorkspace));
     row("stabiliser state and workspace", sizeof(StabiliserState) + sizeof(StabiliserWorkspace));
-    row("solver config, state and workspace", sizeof(SolverConfig) + sizeof(SolverState) + sizeof(SolverWorkspace));
+    row("solver config, state and workspace",
+        sizeof(SolverConfig) + sizeof(SolverState) + sizeof(SolverWorkspace));
     row("shape model and its set-up", sizeof(ShapeModel) + sizeof(ShapeModelWorkspace));
     row("FaceState", sizeof(FaceState));
     row("FrameReport", sizeof(FrameReport));
@@ -122,7 +126,9 @@ void print_memory() {
 int main(int argc, char** argv) {
     CLI::App app{"bench_pipeline: observations to weights, time and memory"};
     std::size_t frames = 600;
-    app.add_option("--frames", frames, "frames of each case")->capture_default_str()->check(CLI::Range(10, 1'000'000));
+    app.add_option("--frames", frames, "frames of each case")
+        ->capture_default_str()
+        ->check(CLI::Range(10, 1'000'000));
     CLI11_PARSE(app, argc, argv);
     using rig::SolverKind;
     const std::vector<rig::test::Case> cases{
@@ -135,12 +141,16 @@ int main(int argc, char** argv) {
         {"2 cameras, 102 markers", 102, 140, 2, SolverKind::kBoxQp},
         {"2 cameras, every capacity", 128, 256, 2, SolverKind::kBoxQp},
     };
-    fmt::print("thread CPU time a frame, tracking included, detection not; {} frames, the first bootstraps\n\n", frames);
-    fmt::print("| case | markers | shapes | p50 us | p99 us | max us | seen | iterations |\n|---|---|---|---|---|---|---|---|\n");
+    fmt::print(
+        "thread CPU time a frame, tracking included, detection not; {} frames, the first bootstraps\n\n",
+        frames);
+    fmt::print(
+        "| case | markers | shapes | p50 us | p99 us | max us | seen | iterations "
+        "|\n|---|---|---|---|---|---|---|---|\n");
     for (const auto& c : cases) {
         const auto s = rig::test::measure(c, frames);
-        fmt::print("| {} | {} | {} | {:.0f} | {:.0f} | {:.0f} | {:.1f} | {:.1f} |\n", c.name, c.markers, c.shapes, s.p50_us,
-                   s.p99_us, s.max_us, s.seen, s.iterations);
+        fmt::print("| {} | {} | {} | {:.0f} | {:.0f} | {:.0f} | {:.1f} | {:.1f} |\n", c.name, c.markers,
+                   c.shapes, s.p50_us, s.p99_us, s.max_us, s.seen, s.iterations);
     }
     rig::test::print_memory();
     return 0;

@@ -131,6 +131,67 @@ void expect_finite_and_in_range(const SolvePack& pack, const FaceState& state, c
     ASSERT_TRUE(report.solved || state.held);
 }
 
+// One pipeline and what is fed to it.
+struct Victim {
+    const test::SyntheticFace& face;
+    Pipeline& pipeline;
+    test::SeededRandom& random;
+    FaceState state{};
+    FrameReport report{};
+};
+
+void step_labelled(Victim& v, std::int64_t at_us, std::span<const Vec3> good) {
+    std::vector<Vec3> points = hostile_points({good.begin(), good.end()}, v.random);
+    if (v.random.chance(0.9)) points.resize(24, Vec3{kNan, kNan, kNan});
+    v.pipeline.step(LabelledFrame{at_us, points}, v.state, v.report);
+}
+
+void step_points(Victim& v, std::int64_t at_us, std::span<const Vec3> good) {
+    const std::vector<Vec3> points = hostile_points({good.begin(), good.end()}, v.random);
+    v.pipeline.step(PointFrame{at_us, points}, v.state, v.report);
+}
+
+void step_observations(Victim& v, std::int64_t at_us, std::span<const Vec3> good) {
+    ObservationFrame input;
+    input.capture_us = at_us;
+    input.camera_count = static_cast<std::uint8_t>(v.random.below(5));
+    std::array<std::vector<Observation>, 2> dots;
+    for (std::size_t c = 0; c < 2; ++c) {
+        dots[c] = hostile_dots(v.face.observe(c, good, 0.1, 0.1, 1, v.random).observations, v.random);
+        input.cameras[c] = dots[c];
+        input.status[c] = static_cast<CameraStatus>(v.random.below(6));
+    }
+    v.pipeline.step(input, v.state, v.report);
+}
+
+void step_images(Victim& v, std::int64_t at_us) {
+    std::vector<std::uint8_t> noise(64 * 48);
+    FrameSet input;
+    input.capture_us = at_us;
+    input.camera_count = static_cast<std::uint8_t>(v.random.below(3));
+    for (std::uint8_t& pixel : noise) pixel = static_cast<std::uint8_t>(v.random.below(256));
+    for (std::size_t c = 0; c < 2; ++c) {
+        if (v.random.chance(0.7)) input.images[c] = {noise.data(), 64, 48, 64};
+        input.status[c] = static_cast<CameraStatus>(v.random.below(6));
+    }
+    v.pipeline.step(input, v.state, v.report);
+}
+
+void step_any(Victim& v, std::int64_t at_us, std::span<const Vec3> good) {
+    switch (v.random.below(5)) {
+        case 0:
+            return step_labelled(v, at_us, good);
+        case 1:
+            return step_points(v, at_us, good);
+        case 2:
+            return step_observations(v, at_us, good);
+        case 3:
+            return step_images(v, at_us);
+        default:
+            return v.pipeline.idle(at_us, v.state, v.report);
+    }
+}
+
 class HostileInput : public testing::TestWithParam<SolverKind> {};
 
 TEST_P(HostileInput, EveryOutputIsFiniteAndInRange) {
@@ -147,70 +208,26 @@ TEST_P(HostileInput, EveryOutputIsFiniteAndInRange) {
     const SolvePack pack = face.pack();
     for (const bool filter : {true, false}) {
         test::SeededRandom random(171);
-        auto pipeline = std::make_unique<Pipeline>();
+        const auto pipeline = std::make_unique<Pipeline>();
         PipelineConfig config;
         config.filter = filter;
         config.loss_policy = filter ? LossPolicy::kDecay : LossPolicy::kHold;
         config.stabilise = random.chance(0.5);
         ASSERT_TRUE(pipeline->configure(pack, config).has_value());
-        std::vector<std::uint8_t> noise(64 * 48);
-        FaceState state;
-        FrameReport report;
+        Victim v{face, *pipeline, random};
         for (int frame = 0; frame < kFrames; ++frame) {
             const std::vector<Vec3> good = face.positions(face.weights_at(frame / 60.0));
-            const std::int64_t at_us = hostile_time(frame * 16'667, random);
-            switch (random.below(5)) {
-                case 0: {
-                    std::vector<Vec3> points = hostile_points(good, random);
-                    if (random.chance(0.9)) points.resize(24, Vec3{kNan, kNan, kNan});
-                    pipeline->step(LabelledFrame{at_us, points}, state, report);
-                    break;
-                }
-                case 1: {
-                    const std::vector<Vec3> points = hostile_points(good, random);
-                    pipeline->step(PointFrame{at_us, points}, state, report);
-                    break;
-                }
-                case 2: {
-                    ObservationFrame input;
-                    input.capture_us = at_us;
-                    input.camera_count = static_cast<std::uint8_t>(random.below(5));
-                    std::array<std::vector<Observation>, 2> dots;
-                    for (std::size_t c = 0; c < 2; ++c) {
-                        dots[c] =
-                            hostile_dots(face.observe(c, good, 0.1, 0.1, 1, random).observations, random);
-                        input.cameras[c] = dots[c];
-                        input.status[c] = static_cast<CameraStatus>(random.below(6));
-                    }
-                    pipeline->step(input, state, report);
-                    break;
-                }
-                case 3: {
-                    FrameSet input;
-                    input.capture_us = at_us;
-                    input.camera_count = static_cast<std::uint8_t>(random.below(3));
-                    for (std::uint8_t& pixel : noise) pixel = static_cast<std::uint8_t>(random.below(256));
-                    for (std::size_t c = 0; c < 2; ++c) {
-                        if (random.chance(0.7)) input.images[c] = {noise.data(), 64, 48, 64};
-                        input.status[c] = static_cast<CameraStatus>(random.below(6));
-                    }
-                    pipeline->step(input, state, report);
-                    break;
-                }
-                default:
-                    pipeline->idle(at_us, state, report);
-                    break;
-            }
-            ASSERT_NO_FATAL_FAILURE(expect_finite_and_in_range(pack, state, report)) << "frame " << frame;
+            step_any(v, hostile_time(frame * 16'667, random), good);
+            ASSERT_NO_FATAL_FAILURE(expect_finite_and_in_range(pack, v.state, v.report)) << "frame " << frame;
         }
         // And then the face is back.
         for (int frame = 0; frame < 40; ++frame) {
             const std::vector<Vec3> good = face.positions(face.weights_at(frame / 60.0));
-            pipeline->step(LabelledFrame{frame * 16'667, good}, state, report);
+            pipeline->step(LabelledFrame{frame * 16'667, good}, v.state, v.report);
         }
-        EXPECT_EQ(state.state, TrackingState::kLive);
-        EXPECT_TRUE(report.solved);
-        EXPECT_LT(report.residual_rms_mm, 0.1) << "filter " << filter;
+        EXPECT_EQ(v.state.state, TrackingState::kLive);
+        EXPECT_TRUE(v.report.solved);
+        EXPECT_LT(v.report.residual_rms_mm, 0.1) << "filter " << filter;
     }
 }
 

@@ -46,7 +46,7 @@ TEST_F(BoardFileTest, MistakesNameTheFileAndTheFault) {
         {"name = 'x'\nrate_hz = nan", "'rate_hz'"},
         {"name = 'x'\nfrozen_frames = 1", "'frozen_frames'"},
         {"name = 'x'\nfrozen_frames = -3", "'frozen_frames'"},
-        {"name = 'x'\nwatchdog_ms = -1", "'watchdog_ms'"},
+        {"name = 'x'\nwatchdog_ms = 5", "'watchdog_ms'"},
         {"name = 'x'\ncolour = 'red'", "'colour'"},
         {"name = 'x'\ncamera = 3", "[[camera]]"},
         {"name = 'x'\n[[camera]]\nname = 'a'", "a source"},

@@ -72,24 +72,32 @@ Blob disc_in_image(const HelmetCamera& camera, double x_mm, double y_mm, double 
     return blob;
 }
 
-// Intensity-weighted centre of a dark dot against the skin around it.
+// Coverage-weighted centre of a dark dot, against a plane through the skin around it: skin tone has slopes of
+// its own.
 Blob measured(const Picture& picture, double near_x, double near_y) {
+    constexpr double kBlack = 2.0;
     const int cx = static_cast<int>(std::lround(near_x)), cy = static_cast<int>(std::lround(near_y));
-    std::vector<double> ring;
-    for (int y = cy - 9; y <= cy + 9; ++y) {
-        for (int x = cx - 9; x <= cx + 9; ++x) {
-            if (std::max(std::abs(x - cx), std::abs(y - cy)) >= 8) ring.push_back(picture.at(x, y));
+    double sum = 0.0, slope_x = 0.0, slope_y = 0.0, squares = 0.0, count = 0.0;
+    for (int y = -9; y <= 9; ++y) {
+        for (int x = -9; x <= 9; ++x) {
+            if (std::max(std::abs(x), std::abs(y)) < 8) continue;
+            const double value = picture.at(cx + x, cy + y) - kBlack;
+            sum += value;
+            slope_x += x * value;
+            slope_y += y * value;
+            squares += x * x;
+            count += 1.0;
         }
     }
-    std::nth_element(ring.begin(), ring.begin() + static_cast<std::ptrdiff_t>(ring.size() / 2), ring.end());
-    const double skin = ring[ring.size() / 2], ink = picture.at(cx, cy);
+    const auto skin = [&](int x, int y) { return sum / count + (slope_x * x + slope_y * y) / squares; };
+    const double ink = (picture.at(cx, cy) - kBlack) / skin(0, 0);
     Blob blob;
-    for (int y = cy - 7; y <= cy + 7; ++y) {
-        for (int x = cx - 7; x <= cx + 7; ++x) {
-            const double share =
-                std::clamp((skin - picture.at(x, y)) / (skin - ink) - 0.12, 0.0, 0.76) / 0.76;
-            blob.x += share * x;
-            blob.y += share * y;
+    for (int y = -7; y <= 7; ++y) {
+        for (int x = -7; x <= 7; ++x) {
+            const double lost = 1.0 - (picture.at(cx + x, cy + y) - kBlack) / skin(x, y);
+            const double share = std::clamp(lost / (1.0 - ink) - 0.08, 0.0, 0.84) / 0.84;
+            blob.x += share * (cx + x);
+            blob.y += share * (cy + y);
             blob.area += share;
         }
     }
