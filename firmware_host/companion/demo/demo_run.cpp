@@ -386,6 +386,15 @@ void fill_figures(const Stage& stage, const WorldServer& server, const HostSessi
     figures.solve_max_ms = health.solve.max_us * 1e-3;
 }
 
+// Of the observations that the daemon recorded, solved again here.
+Result<std::uint64_t, FileError> replay_digest(const DemoOptions& options, const OpenedPack& pack) {
+    const ReplayRequest request{options.out_folder / "take.rgo", (options.out_folder / "face.pack").string(),
+                                false};
+    const auto replayed = replay_log(request, pack, [](const FaceState&, double) { return true; });
+    if (!replayed) return failure(replayed.error());
+    return replayed->digest;
+}
+
 }  // namespace
 
 std::vector<std::string> broken_bounds(const DemoFigures& figures, const DemoBounds& bounds, bool real_time) {
@@ -473,12 +482,10 @@ Result<DemoFigures, FileError> run_demo(const DemoOptions& options, const DemoEv
     if (served != ServerEnd::kCompleted)
         return failure(daemon_fault(options, "left the world before its end"));
     events.step("solving the recorded observations again");
-    const auto replayed =
-        replay_log({options.out_folder / "take.rgo", (options.out_folder / "face.pack").string(), false},
-                   *pack, [](const FaceState&, double) { return true; });
+    const auto replayed = replay_digest(options, *pack);
     if (!replayed) return failure(replayed.error());
     figures.digest = reception.digest();
-    figures.replayed_digest = replayed->digest;
+    figures.replayed_digest = *replayed;
     events.step("drawing the pictures");
     if (const auto written = write_outputs(options, *stage, pack->pack(), reception, figures); !written) {
         return failure(written.error());
