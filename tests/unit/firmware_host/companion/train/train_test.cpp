@@ -64,7 +64,7 @@ TEST(Train, WhatIsTrainedIsWhatIsOpened) {
         TrainOptions options;
         options.solver = solver;
         options.takes = {tiny.take};
-        options.rbf.centres = 20;
+        options.rbf.centres = 12;
         const auto trained = train(tiny.rig, tiny.layout, options);
         ASSERT_TRUE(trained.has_value()) << trained.error().message;
         expect_round_trip(*trained);
