@@ -33,7 +33,8 @@ endfunction()
 # contraction of a*b+c (a fused result differs between instruction sets), no Eigen vector kernels.
 function(rig_core_library name)
     rig_library(${name} ${ARGN})
-    target_compile_options(${name} PRIVATE -fno-exceptions -fno-rtti -ffp-contract=off -fno-math-errno)
+    target_compile_options(${name} PRIVATE -fno-exceptions -fno-rtti -ffp-contract=off -fno-math-errno
+        $<$<CONFIG:Release>:-O3>)
     target_compile_definitions(${name} PUBLIC EIGEN_DONT_VECTORIZE EIGEN_DONT_PARALLELIZE)
 endfunction()
 
@@ -51,6 +52,8 @@ function(rig_test name)
     cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
     rig_program(${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gtest GTest::gtest_main)
     set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+    # Tests run for seconds and compile for minutes: what they test is fully optimised, they are not.
+    target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
     add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
     if(NOT ARG_TIMEOUT)
         set(ARG_TIMEOUT 300)

@@ -1,5 +1,5 @@
-// A way for bytes to the host and back. Streams (serial) may split and join writes; datagram links keep each write
-// whole. The framing above works on both.
+// A way for bytes to the host and back. Streams (serial) may split and join writes; datagram links keep each
+// write whole. The framing above works on both.
 #pragma once
 
 #include <cstddef>
@@ -16,10 +16,10 @@ enum class LinkError : std::uint8_t {
     kOpen,    // could not be opened
 };
 
-// Contract. Nothing blocks. write() takes a prefix of the bytes and returns its length, 0 when the other side does not
-// read; a datagram link takes all or nothing. read() returns how many bytes it put at the start of `into`, 0 when none
-// are there. kClosed is sticky until open(). open() on an open link closes it first. No call but open() allocates.
-// One thread uses a link.
+// Contract. Nothing blocks. write() takes a prefix of the bytes and returns its length, 0 when the other side
+// does not read; a datagram link takes all or nothing. read() returns how many bytes it put at the start of
+// `into`, 0 when none are there. kClosed is sticky until open(). open() on an open link closes it first. No
+// call but open() allocates. One thread uses a link.
 class ByteLink {
   public:
     virtual ~ByteLink() = default;

@@ -5,8 +5,9 @@
 
 namespace rig {
 
-// Microseconds since an arbitrary start. Contract: now_us() never decreases; sleep_until_us() returns at or after the
-// deadline on this same clock (at once when it has passed) or early after interrupt(). Safe from any thread.
+// Microseconds since an arbitrary start. Contract: now_us() never decreases; sleep_until_us() returns at or
+// after the deadline on this same clock (at once when it has passed) or early after interrupt(). Safe from
+// any thread.
 class Clock {
   public:
     virtual ~Clock() = default;

@@ -10,14 +10,14 @@
 namespace rig {
 
 enum class FrameError : std::uint8_t {
-    kTimeout,       // nothing before the deadline
-    kGone,          // the camera is not there any more; close, then open again
-    kIo,            // a transfer failed; the camera is still there
-    kShort,         // a frame of the wrong length was discarded
-    kFormat,        // a frame of the wrong size or format was discarded
-    kNotStarted,    // start() has not succeeded
-    kRefused,       // a mode or control that this source cannot set
-    kEnded,         // the source is finite and is at its end (replay, simulated takes)
+    kTimeout,     // nothing before the deadline
+    kGone,        // the camera is not there any more; close, then open again
+    kIo,          // a transfer failed; the camera is still there
+    kShort,       // a frame of the wrong length was discarded
+    kFormat,      // a frame of the wrong size or format was discarded
+    kNotStarted,  // start() has not succeeded
+    kRefused,     // a mode or control that this source cannot set
+    kEnded,       // the source is finite and is at its end (replay, simulated takes)
 };
 
 struct FrameFormat {
@@ -27,16 +27,16 @@ struct FrameFormat {
 };
 
 struct CameraFrame {
-    ImageView image;               // borrowed until release()
-    std::int64_t capture_us = 0;   // mid-exposure, on the Clock that belongs to the source
-    std::uint32_t sequence = 0;    // counts captured frames, wraps; a gap is a lost frame
-    std::uint32_t token = 0;       // for release()
+    ImageView image;              // borrowed until release()
+    std::int64_t capture_us = 0;  // mid-exposure, on the Clock that belongs to the source
+    std::uint32_t sequence = 0;   // counts captured frames, wraps; a gap is a lost frame
+    std::uint32_t token = 0;      // for release()
 };
 
-// Contract. One thread uses a source. start() and stop() pair; stop() is idempotent and also ends a failed start.
-// wait_frame() returns a frame captured after the previous one, or an error no later than deadline_us; it never
-// blocks longer. At most borrow_limit() frames may be unreleased; frames are released in any order and each once.
-// No call allocates after start().
+// Contract. One thread uses a source. start() and stop() pair; stop() is idempotent and also ends a failed
+// start. wait_frame() returns a frame captured after the previous one, or an error no later than deadline_us;
+// it never blocks longer. At most borrow_limit() frames may be unreleased; frames are released in any order
+// and each once. No call allocates after start().
 class FrameSource {
   public:
     virtual ~FrameSource() = default;

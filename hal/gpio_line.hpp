@@ -14,9 +14,9 @@ struct EdgeEvent {
     std::int64_t time_us = 0;  // of the edge, on the Clock that belongs to the line
 };
 
-// Contract. `true` is active whatever the wiring's polarity. set() needs an output line, wait_edge() an input line,
-// get() works on both. wait_edge() returns edges in order, each once, or kTimeout no later than deadline_us.
-// The initial state of an output is given at construction. One thread uses a line.
+// Contract. `true` is active whatever the wiring's polarity. set() needs an output line, wait_edge() an input
+// line, get() works on both. wait_edge() returns edges in order, each once, or kTimeout no later than
+// deadline_us. The initial state of an output is given at construction. One thread uses a line.
 class GpioLine {
   public:
     virtual ~GpioLine() = default;

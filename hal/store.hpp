@@ -1,4 +1,5 @@
-// Persistent bytes. Every change is one of three numbered operations, so that a harness can cut the power at each.
+// Persistent bytes. Every change is one of three numbered operations, so that a harness can cut the power at
+// each.
 #pragma once
 
 #include <cstddef>
@@ -11,9 +12,10 @@ namespace rig {
 
 enum class StoreError : std::uint8_t { kIo, kOutOfRange, kNoSpace, kOpen };
 
-// A region of size_bytes(), initially all 0xFF. Contract: read() returns the last programmed bytes; program() changes
-// exactly its range; erase() sets its range to 0xFF; what was changed before a sync() that succeeded survives a power
-// cut, what was changed after it may be there wholly, partly or not at all. One thread uses a store.
+// A region of size_bytes(), initially all 0xFF. Contract: read() returns the last programmed bytes; program()
+// changes exactly its range; erase() sets its range to 0xFF; what was changed before a sync() that succeeded
+// survives a power cut, what was changed after it may be there wholly, partly or not at all. One thread uses
+// a store.
 class Store {
   public:
     virtual ~Store() = default;

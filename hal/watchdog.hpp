@@ -5,8 +5,8 @@
 
 namespace rig {
 
-// Contract: after arm(), feed() must be called at least every timeout_us() or the process is ended from outside. Only
-// a completed tick feeds it. Never blocks. disarm() for a clean end.
+// Contract: after arm(), feed() must be called at least every timeout_us() or the process is ended from
+// outside. Only a completed tick feeds it. Never blocks. disarm() for a clean end.
 class Watchdog {
   public:
     virtual ~Watchdog() = default;

@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kMaxJacobiSweeps = 30;
 
-void rotate_rows_and_columns(double* a, std::size_t n, std::size_t stride, std::size_t p, std::size_t q, double c,
-                             double s) {
+void rotate_rows_and_columns(double* a, std::size_t n, std::size_t stride, std::size_t p, std::size_t q,
+                             double c, double s) {
     for (std::size_t k = 0; k < n; ++k) {
         const double akp = a[k * stride + p];
         const double akq = a[k * stride + q];
@@ -26,7 +26,8 @@ void rotate_rows_and_columns(double* a, std::size_t n, std::size_t stride, std::
     }
 }
 
-void rotate_columns(double* v, std::size_t n, std::size_t stride, std::size_t p, std::size_t q, double c, double s) {
+void rotate_columns(double* v, std::size_t n, std::size_t stride, std::size_t p, std::size_t q, double c,
+                    double s) {
     for (std::size_t k = 0; k < n; ++k) {
         const double vkp = v[k * stride + p];
         const double vkq = v[k * stride + q];
@@ -130,7 +131,8 @@ void inverse_diagonal(const double* l, std::size_t n, std::size_t stride, double
         double sum = 0.0;
         for (std::size_t i = column; i < n; ++i) {
             const double unit = i == column ? 1.0 : 0.0;
-            scratch[i] = (unit - dot(l + i * stride + column, scratch + column, i - column)) / l[i * stride + i];
+            scratch[i] =
+                (unit - dot(l + i * stride + column, scratch + column, i - column)) / l[i * stride + i];
             sum += scratch[i] * scratch[i];
         }
         diagonal[column] = sum;

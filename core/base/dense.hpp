@@ -1,21 +1,23 @@
-// Dense kernels of the solvers: row-major double matrices in caller's memory, fixed summation order, no allocation.
-// Not a general linear algebra library: exactly what normal equations and symmetric factors need.
+// Dense kernels of the solvers: row-major double matrices in caller's memory, fixed summation order, no
+// allocation. Not a general linear algebra library: exactly what normal equations and symmetric factors need.
 #pragma once
 
 #include <cstddef>
 
 namespace rig {
 
-// Sum of a[i] b[i], in four interleaved partial sums added as ((s0 + s1) + (s2 + s3)): the same bits everywhere.
+// Sum of a[i] b[i], in four interleaved partial sums added as ((s0 + s1) + (s2 + s3)): the same bits
+// everywhere.
 [[nodiscard]] double dot(const double* a, const double* b, std::size_t n);
 
 // y += alpha x
 void add_scaled(double* y, double alpha, const double* x, std::size_t n);
 
-// Lower Cholesky factor of the symmetric n x n matrix `a` (its lower triangle is read) into `l` (lower triangle
-// written; may be `a` itself). Rows are `stride` apart. False when a pivot is not above `floor` times the
-// largest diagonal entry of `a`: the matrix is not positive definite to working precision.
-[[nodiscard]] bool cholesky(const double* a, double* l, std::size_t n, std::size_t stride, double floor = 1e-14);
+// Lower Cholesky factor of the symmetric n x n matrix `a` (its lower triangle is read) into `l` (lower
+// triangle written; may be `a` itself). Rows are `stride` apart. False when a pivot is not above `floor`
+// times the largest diagonal entry of `a`: the matrix is not positive definite to working precision.
+[[nodiscard]] bool cholesky(const double* a, double* l, std::size_t n, std::size_t stride,
+                            double floor = 1e-14);
 
 // x := L^-1 x and x := L^-T x.
 void solve_lower(const double* l, std::size_t n, std::size_t stride, double* x);
@@ -24,8 +26,9 @@ void solve_lower_transposed(const double* l, std::size_t n, std::size_t stride, 
 // Diagonal of (L L^T)^-1 into diagonal[n]; `scratch` holds n doubles.
 void inverse_diagonal(const double* l, std::size_t n, std::size_t stride, double* diagonal, double* scratch);
 
-// Eigenvalues (falling) and eigenvectors (column j of `vectors` belongs to values[j]) of the symmetric n x n matrix
-// `a`, which is destroyed. Cyclic Jacobi, at most 30 sweeps. For set-up, not for frames: about 10 n^3 operations.
+// Eigenvalues (falling) and eigenvectors (column j of `vectors` belongs to values[j]) of the symmetric n x n
+// matrix `a`, which is destroyed. Cyclic Jacobi, at most 30 sweeps. For set-up, not for frames: about 10 n^3
+// operations.
 void symmetric_eigen(double* a, std::size_t n, std::size_t stride, double* values, double* vectors);
 
 }  // namespace rig

@@ -9,16 +9,17 @@
 
 namespace rig {
 
-// The state ladder of the output contract. Worse states have smaller numbers, so "the worst wins" is std::min.
+// The state ladder of the output contract. Worse states have smaller numbers, so "the worst wins" is
+// std::min.
 enum class TrackingState : std::uint8_t { kSafe = 0, kLost = 1, kHold = 2, kPartial = 3, kLive = 4 };
 
 enum class CameraStatus : std::uint8_t {
-    kUnused = 0,  // not part of this rig
-    kGood = 1,    // delivered the frame of this tick
-    kMissing = 2, // nothing usable for this tick
-    kGone = 3,    // unplugged or closed
-    kFrozen = 4,  // repeats itself
-    kExposure = 5 // too dark, too bright, or changing at once
+    kUnused = 0,   // not part of this rig
+    kGood = 1,     // delivered the frame of this tick
+    kMissing = 2,  // nothing usable for this tick
+    kGone = 3,     // unplugged or closed
+    kFrozen = 4,   // repeats itself
+    kExposure = 5  // too dark, too bright, or changing at once
 };
 
 // Headset slip: observed = R(rotation) face + translation. Rotation vector, rig origin.
@@ -27,16 +28,17 @@ struct Slip {
     std::array<float, 3> translation_mm{};
 };
 
-// Every weight is finite and inside the range that its pack declares. When `held`, no solve stands behind this tick:
-// weights are the last good ones, the decay to rest or the rest pose, and age_us says how old the capture is.
+// Every weight is finite and inside the range that its pack declares. When `held`, no solve stands behind
+// this tick: weights are the last good ones, the decay to rest or the rest pose, and age_us says how old the
+// capture is.
 struct FaceState {
-    std::uint32_t sequence = 0;    // +1 each tick, wraps
-    std::int64_t capture_us = 0;   // mid-exposure of the frame behind the weights, board's monotonic clock
-    std::int64_t age_us = 0;       // time of encoding minus capture_us
+    std::uint32_t sequence = 0;   // +1 each tick, wraps
+    std::int64_t capture_us = 0;  // mid-exposure of the frame behind the weights, board's monotonic clock
+    std::int64_t age_us = 0;      // time of encoding minus capture_us
     TrackingState state = TrackingState::kSafe;
     bool held = true;
     std::array<CameraStatus, kMaxCameras> cameras{};
-    FaultMap faults = 0;           // current, not latched
+    FaultMap faults = 0;  // current, not latched
     Slip slip;
     std::uint16_t shape_count = 0;
     std::array<float, kMaxShapes> weights{};

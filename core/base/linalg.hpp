@@ -1,5 +1,5 @@
-// The one place that includes Eigen. Small fixed sizes only, unvectorised: Eigen's vector kernels change their
-// summation order with the instruction set, and equal bits on every machine are part of the contract.
+// The one place that includes Eigen. Small fixed sizes only, unvectorised: Eigen's vector kernels change
+// their summation order with the instruction set, and equal bits on every machine are part of the contract.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,7 +22,9 @@ struct Rigid {
     Vec3 translation_mm = Vec3::Zero();
 
     [[nodiscard]] Vec3 apply(const Vec3& x) const { return rotation * x + translation_mm; }
-    [[nodiscard]] Vec3 apply_inverse(const Vec3& y) const { return rotation.transpose() * (y - translation_mm); }
+    [[nodiscard]] Vec3 apply_inverse(const Vec3& y) const {
+        return rotation.transpose() * (y - translation_mm);
+    }
 };
 
 }  // namespace rig

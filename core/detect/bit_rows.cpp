@@ -4,7 +4,7 @@ namespace rig {
 
 int count_bits(const BitRows& rows, int height) {
     int count = 0;
-    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) count += std::popcount(rows[y]);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) count += ones(rows[y]);
     return count;
 }
 

@@ -24,6 +24,14 @@ using BitRows = std::array<std::uint64_t, kBlobWindowPx>;
     return row_mask(end) & ~row_mask(begin);
 }
 
+// Not std::popcount: without the instruction, which not every target has, that is a library call.
+[[nodiscard]] constexpr int ones(std::uint64_t bits) {
+    bits -= bits >> 1 & 0x5555555555555555ULL;
+    bits = (bits & 0x3333333333333333ULL) + (bits >> 2 & 0x3333333333333333ULL);
+    bits = (bits + (bits >> 4)) & 0x0F0F0F0F0F0F0F0FULL;
+    return static_cast<int>((bits * 0x0101010101010101ULL) >> 56);
+}
+
 [[nodiscard]] int count_bits(const BitRows& rows, int height);
 
 // One step into the four (eight) neighbours.

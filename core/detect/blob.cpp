@@ -13,8 +13,8 @@ constexpr int kFull = 256;           // cover of a pixel that is all blob
 constexpr int kHalf = kFull / 2;     // where the outline is drawn,
 constexpr int kDeep = 176;           // or here where shadow touches the marker
 constexpr int kRamp = 64;            // soft threshold: weight 0 to 1 from outline - kRamp to outline + kRamp
-constexpr double kLeastShare = 0.4;  // of the light at the centre that a pixel's background may have,
-constexpr double kGreatestShare = 2.5;  // so that a bad plane cannot run away
+constexpr float kLeastShare = 0.4F;  // of the light at the centre that a pixel's background may have,
+constexpr float kGreatestShare = 2.5F;  // so that a bad plane cannot run away
 constexpr int kRedrawReach = 2;         // px that a redrawn outline may lie outside the old one
 constexpr int kMoatReach = 3;           // px
 constexpr int kOpenCover = 112;         // a moat pixel darker than this is no background
@@ -281,40 +281,42 @@ Box box_around(const BlobWorkspace& w, int by) {
 // background's gradient; taking it as constant pulls centres towards the bright side (0.15 px on a shaded
 // forehead).
 void compute_cover(BlobWorkspace& w, Side side, const Plane& plane, double depth) {
-    const double black = side == Side::kBelow ? 0.0 : 255.0;
+    const float black = side == Side::kBelow ? 0.0F : 255.0F;
     const double light = side == Side::kBelow ? 1.0 : -1.0;
-    const double centre_light = std::max(1.0, light * (plane.level - black));
-    const double to_share = light / centre_light;
-    const double scale = kFull / depth;
+    const double centre_light = std::max(1.0, light * (plane.level - static_cast<double>(black)));
+    const auto to_share = static_cast<float>(light / centre_light);
+    const auto scale = static_cast<float>(kFull / depth);
+    const auto slope = static_cast<float>(plane.slope_x);
     const Box box = box_around(w, kRedrawReach + kMoatReach);
     for (int y = box.top; y < box.bottom; ++y) {
-        const auto& values = w.values[static_cast<std::size_t>(y)];
-        auto& cover = w.cover[static_cast<std::size_t>(y)];
-        const double row_level =
-            plane.level + plane.slope_y * (y - plane.centre_y) - plane.slope_x * plane.centre_x;
+        const std::uint8_t* values = w.values[static_cast<std::size_t>(y)].data();
+        std::int16_t* cover = w.cover[static_cast<std::size_t>(y)].data();
+        const auto row_level = static_cast<float>(plane.at(0.0, y));
         for (int x = box.left; x < box.right; ++x) {
-            const double level = row_level + plane.slope_x * x;
-            const double share = std::clamp((level - black) * to_share, kLeastShare, kGreatestShare);
-            const double c = (level - values[static_cast<std::size_t>(x)]) * scale / share;
-            cover[static_cast<std::size_t>(x)] = static_cast<std::int16_t>(std::clamp(c, -256.0, 512.0));
+            const float level = row_level + slope * static_cast<float>(x);
+            const float share = std::clamp((level - black) * to_share, kLeastShare, kGreatestShare);
+            const float c = (level - static_cast<float>(values[x])) * scale / share;
+            cover[x] = static_cast<std::int16_t>(static_cast<int>(std::clamp(c, -256.0F, 512.0F)));
         }
     }
 }
 
-// Pixels near the old blob whose cover reaches `outline`.
+// Pixels near the old blob whose cover reaches `outline`. Cover is stale outside the box, and cut away there.
 void mark_covered(const BlobWorkspace& w, int outline, BitRows& covered) {
     const Box box = box_around(w, kRedrawReach);
     covered = w.blob;
     grow_square(covered, w.height);
     grow_cross(covered, w.height);
     for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) covered[y] &= ~w.foreign[y];
-    for (int y = box.top; y < box.bottom; ++y) {
-        const auto row = static_cast<std::size_t>(y);
+    for (auto y = static_cast<std::size_t>(box.top); y < static_cast<std::size_t>(box.bottom); ++y) {
         std::uint64_t bits = 0;
-        for (int x = box.left; x < box.right; ++x) {
-            bits |= std::uint64_t{w.cover[row][static_cast<std::size_t>(x)] >= outline} << x;
+        for (std::size_t x = static_cast<std::size_t>(box.left) / 8 * 8;
+             x < static_cast<std::size_t>(box.right); x += 8) {
+            std::array<std::uint8_t, 8> reached;
+            for (std::size_t k = 0; k < 8; ++k) reached[k] = w.cover[y][x + k] >= outline ? 1 : 0;
+            bits |= std::uint64_t{packed_bytes(std::bit_cast<std::uint64_t>(reached))} << x;
         }
-        covered[row] &= bits;
+        covered[y] &= bits;
     }
 }
 
@@ -391,6 +393,7 @@ Moments soft_moments(BlobWorkspace& w, int outline) {
 double outline_deviation_px(const BlobWorkspace& w, const Moments& m, double mean_radius_px) {
     const double determinant = m.xx * m.yy - m.xy * m.xy;
     if (determinant <= 0.0) return kBlobWindowPx;
+    // Row by row the ellipse a dx^2 + b dx dy + c dy^2 <= 4 is one span.
     const Box box = box_around(w, 2);
     const double a = m.yy / determinant;
     const double b = -2.0 * m.xy / determinant;
@@ -398,12 +401,16 @@ double outline_deviation_px(const BlobWorkspace& w, const Moments& m, double mea
     int wrong = 0;
     for (int y = box.top; y < box.bottom; ++y) {
         const double dy = y - m.y;
+        const double root = b * b * dy * dy - 4.0 * a * (c * dy * dy - 4.0);
         std::uint64_t ellipse = 0;
-        for (int x = box.left; x < box.right; ++x) {
-            const double dx = x - m.x;
-            ellipse |= std::uint64_t{(a * dx + b * dy) * dx + c * dy * dy <= 4.0} << x;
+        if (root >= 0.0) {
+            const double middle = m.x - 0.5 * b * dy / a;
+            const double half = 0.5 * sqrt(root) / a;
+            const auto begin = static_cast<int>(std::clamp(middle - half, 0.0, 63.0) + 0.999999);
+            const auto end = static_cast<int>(std::clamp(middle + half, -1.0, 63.0) + 1.0);
+            if (begin < end) ellipse = bit_span(begin, end);
         }
-        wrong += std::popcount(ellipse ^ w.blob[static_cast<std::size_t>(y)]);
+        wrong += ones(ellipse ^ w.blob[static_cast<std::size_t>(y)]);
     }
     return wrong / (6.283185307179586 * mean_radius_px);
 }

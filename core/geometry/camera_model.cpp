@@ -6,8 +6,9 @@ namespace rig {
 
 namespace {
 
-constexpr int kUndistortSteps = 12;      // Newton; a lens of 75 degrees with k1 = -0.3 needs 6 for 1e-9 px
-constexpr double kFoldDeterminant = 0.05;  // under it the pixel lies where the lens model folds: no Newton step there
+constexpr int kUndistortSteps = 12;  // Newton; a lens of 75 degrees with k1 = -0.3 needs 6 for 1e-9 px
+constexpr double kFoldDeterminant =
+    0.05;  // under it the pixel lies where the lens model folds: no Newton step there
 
 Vec2 distort(const CameraModel& camera, const Vec2& p) {
     const double r2 = p.dot(p);
@@ -51,7 +52,8 @@ Vec3 pixel_ray(const CameraModel& camera, const Vec2& pixel) {
         const double determinant = slope(0, 0) * slope(1, 1) - slope(0, 1) * slope(1, 0);
         if (determinant > kFoldDeterminant) {
             p -= Vec2{slope(1, 1) * error[0] - slope(0, 1) * error[1],
-                      slope(0, 0) * error[1] - slope(1, 0) * error[0]} / determinant;
+                      slope(0, 0) * error[1] - slope(1, 0) * error[0]} /
+                 determinant;
         } else {
             p -= error;
         }

@@ -23,7 +23,8 @@ struct CameraModel {
     Vec3 centre_mm = Vec3::Zero();                // optical centre in the headset frame
 };
 
-// Pixel of a headset-frame point; z_mm is the depth along the optical axis (a point with z_mm <= 0 is behind).
+// Pixel of a headset-frame point; z_mm is the depth along the optical axis (a point with z_mm <= 0 is
+// behind).
 struct Projection {
     Vec2 pixel = Vec2::Zero();
     double z_mm = 0.0;

@@ -10,10 +10,12 @@ namespace rig {
 
 namespace {
 
-constexpr double kSmallestModeMm = 0.01;  // rms over all coordinates; below it a mode is under any camera's noise
+constexpr double kSmallestModeMm =
+    0.01;  // rms over all coordinates; below it a mode is under any camera's noise
 
 // Gram matrix S^1/2 B^T B S^1/2 in workspace.gram.
-void build_gram(std::span<const float> basis_mm, std::span<const float> sigma, ShapeModelWorkspace& workspace) {
+void build_gram(std::span<const float> basis_mm, std::span<const float> sigma,
+                ShapeModelWorkspace& workspace) {
     const std::size_t n = sigma.size();
     const std::size_t rows = basis_mm.size() / n;
     workspace.gram.fill(0.0);
@@ -23,13 +25,15 @@ void build_gram(std::span<const float> basis_mm, std::span<const float> sigma, S
             const double left = static_cast<double>(row[i]) * static_cast<double>(sigma[i]);
             if (left == 0.0) continue;
             for (std::size_t j = 0; j < n; ++j) {
-                workspace.gram[i * kMaxShapes + j] += left * static_cast<double>(row[j]) * static_cast<double>(sigma[j]);
+                workspace.gram[i * kMaxShapes + j] +=
+                    left * static_cast<double>(row[j]) * static_cast<double>(sigma[j]);
             }
         }
     }
 }
 
-double leading_modes(const ShapeModelWorkspace& workspace, std::size_t n, std::size_t rows, std::uint16_t& kept) {
+double leading_modes(const ShapeModelWorkspace& workspace, std::size_t n, std::size_t rows,
+                     std::uint16_t& kept) {
     kept = 0;
     double left_out = 0.0;
     const double smallest = kSmallestModeMm * kSmallestModeMm * static_cast<double>(rows);
@@ -44,12 +48,13 @@ double leading_modes(const ShapeModelWorkspace& workspace, std::size_t n, std::s
 }
 
 // Rows [ -[R q]x | I | R M ] of the residual's derivative, three of them, `stride` apart.
-void fill_rows(const ShapeModel& model, std::size_t marker, const Rigid& pose, const Vec3& turned, double* rows,
-               std::size_t stride) {
+void fill_rows(const ShapeModel& model, std::size_t marker, const Rigid& pose, const Vec3& turned,
+               double* rows, std::size_t stride) {
     const double x = turned[0];
     const double y = turned[1];
     const double z = turned[2];
-    const double head[3][6] = {{0.0, z, -y, 1.0, 0.0, 0.0}, {-z, 0.0, x, 0.0, 1.0, 0.0}, {y, -x, 0.0, 0.0, 0.0, 1.0}};
+    const double head[3][6] = {
+        {0.0, z, -y, 1.0, 0.0, 0.0}, {-z, 0.0, x, 0.0, 1.0, 0.0}, {y, -x, 0.0, 0.0, 0.0, 1.0}};
     for (std::size_t r = 0; r < 3; ++r) {
         for (std::size_t c = 0; c < 6; ++c) rows[r * stride + c] = head[r][c];
     }
@@ -66,7 +71,8 @@ void add_marker(const Mat3& information, const Vec3& error, std::size_t size, Sh
     for (std::size_t r = 0; r < 3; ++r) {
         const auto row = static_cast<Eigen::Index>(r);
         for (std::size_t c = 0; c < size; ++c) {
-            w.weighted[r * kStride + c] = information(row, 0) * w.rows[c] + information(row, 1) * w.rows[kStride + c] +
+            w.weighted[r * kStride + c] = information(row, 0) * w.rows[c] +
+                                          information(row, 1) * w.rows[kStride + c] +
                                           information(row, 2) * w.rows[2 * kStride + c];
         }
     }
@@ -78,7 +84,8 @@ void add_marker(const Mat3& information, const Vec3& error, std::size_t size, Sh
         for (std::size_t j = 0; j <= i; ++j) {
             out[j] += a0 * w.weighted[j] + a1 * w.weighted[kStride + j] + a2 * w.weighted[2 * kStride + j];
         }
-        w.right[i] += w.weighted[i] * error[0] + w.weighted[kStride + i] * error[1] + w.weighted[2 * kStride + i] * error[2];
+        w.right[i] += w.weighted[i] * error[0] + w.weighted[kStride + i] * error[1] +
+                      w.weighted[2 * kStride + i] * error[2];
     }
 }
 
@@ -121,8 +128,10 @@ double objective(const ShapeModel& model, std::span<const Vec3> positions, std::
         sum += e.dot(weighted);
     }
     const PriorOffsets offsets = offsets_from_prior(fit, prior);
-    sum += offsets.rotation_rad.dot(offsets.rotation_rad) / (prior.rotation_sigma_rad * prior.rotation_sigma_rad);
-    sum += offsets.translation_mm.dot(offsets.translation_mm) / (prior.translation_sigma_mm * prior.translation_sigma_mm);
+    sum += offsets.rotation_rad.dot(offsets.rotation_rad) /
+           (prior.rotation_sigma_rad * prior.rotation_sigma_rad);
+    sum += offsets.translation_mm.dot(offsets.translation_mm) /
+           (prior.translation_sigma_mm * prior.translation_sigma_mm);
     for (std::size_t j = 0; j < model.mode_count; ++j) {
         const double d = (fit.coefficients[j] - prior.coefficients[j]) / prior.coefficient_sigma;
         sum += d * d;
@@ -130,8 +139,9 @@ double objective(const ShapeModel& model, std::span<const Vec3> positions, std::
     return sum;
 }
 
-bool gauss_newton_step(const ShapeModel& model, std::span<const Vec3> positions, std::span<const Mat3> informations,
-                       const ShapePrior& prior, ShapeFitWorkspace& w, ShapeFit& fit) {
+bool gauss_newton_step(const ShapeModel& model, std::span<const Vec3> positions,
+                       std::span<const Mat3> informations, const ShapePrior& prior, ShapeFitWorkspace& w,
+                       ShapeFit& fit) {
     constexpr std::size_t kStride = ShapeFitWorkspace::kSize;
     const std::size_t size = 6U + model.mode_count;
     w.normal.fill(0.0);
@@ -180,7 +190,8 @@ void build_shape_model(std::span<const float> neutral_mm, std::span<const float>
             const auto at = static_cast<Eigen::Index>(axis);
             const float* row = basis_mm.data() + (3 * k + axis) * n;
             double mean = static_cast<double>(neutral_mm[3 * k + axis]);
-            for (std::size_t i = 0; i < n; ++i) mean += static_cast<double>(row[i]) * static_cast<double>(prior_mean[i]);
+            for (std::size_t i = 0; i < n; ++i)
+                mean += static_cast<double>(row[i]) * static_cast<double>(prior_mean[i]);
             model.mean_mm[k][at] = mean;
             for (std::size_t j = 0; j < model.mode_count; ++j) {
                 double sum = 0.0;
@@ -194,9 +205,9 @@ void build_shape_model(std::span<const float> neutral_mm, std::span<const float>
     }
 }
 
-void fit_shape(const ShapeModel& model, std::span<const Vec3> positions_mm, std::span<const Mat3> informations,
-               const ShapePrior& prior, int iterations, const ShapeFit& start, ShapeFitWorkspace& workspace,
-               ShapeFit& fit) {
+void fit_shape(const ShapeModel& model, std::span<const Vec3> positions_mm,
+               std::span<const Mat3> informations, const ShapePrior& prior, int iterations,
+               const ShapeFit& start, ShapeFitWorkspace& workspace, ShapeFit& fit) {
     RIG_CHECK(positions_mm.size() == model.marker_count && informations.size() == model.marker_count);
     fit = start;
     fit.ok = true;

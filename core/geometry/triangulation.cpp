@@ -21,7 +21,8 @@ Mat3 inverse_3x3(const Mat3& a) {
     return inverse;
 }
 
-Triangulation triangulate(std::span<const Sighting> sightings, const Vec3& expected_mm, double prior_information) {
+Triangulation triangulate(std::span<const Sighting> sightings, const Vec3& expected_mm,
+                          double prior_information) {
     RIG_CHECK(!sightings.empty());
     Triangulation result;
     // Relative to the expected position the sums stay small and well scaled.

@@ -7,8 +7,8 @@
 
 namespace rig {
 
-// One sighting of a marker, headset frame. From a camera: any point of the ray, its unit direction, and the inverse
-// variance across it. From a 3D stream: the point itself and direction zero.
+// One sighting of a marker, headset frame. From a camera: any point of the ray, its unit direction, and the
+// inverse variance across it. From a 3D stream: the point itself and direction zero.
 struct Sighting {
     Vec3 point_mm = Vec3::Zero();
     Vec3 direction = Vec3::Zero();
@@ -31,9 +31,9 @@ struct Triangulation {
     double gap_mm = 0.0;              // largest distance of a sighting from the position
 };
 
-// Weighted least squares over sightings. Directions in which they say little (one ray; nearly parallel rays) are taken
-// from `expected_mm` by a prior of `prior_information` (1/mm^2), which is not counted in `information`.
-// Precondition: sightings not empty, all numbers finite.
+// Weighted least squares over sightings. Directions in which they say little (one ray; nearly parallel rays)
+// are taken from `expected_mm` by a prior of `prior_information` (1/mm^2), which is not counted in
+// `information`. Precondition: sightings not empty, all numbers finite.
 [[nodiscard]] Triangulation triangulate(std::span<const Sighting> sightings, const Vec3& expected_mm,
                                         double prior_information);
 

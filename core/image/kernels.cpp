@@ -125,11 +125,6 @@ void mark_above(const std::uint8_t* pixels, const std::uint8_t* thresholds, std:
     for (std::size_t x = 0; x < width; ++x) mask[x] = pixels[x] > thresholds[x] ? 255 : 0;
 }
 
-// One bit per byte of a word of 0x00 and 0xFF bytes, lowest address first.
-std::uint32_t packed(std::uint64_t word) {
-    return static_cast<std::uint32_t>(((word & 0x0101010101010101ULL) * 0x0102040810204080ULL) >> 56);
-}
-
 // `mask` is padded with zeros to a multiple of eight, plus eight, so that an open run always closes.
 std::size_t scan_row(const std::uint8_t* mask, std::size_t width, int y, Run* runs) {
     std::size_t count = 0;
@@ -139,7 +134,7 @@ std::size_t scan_row(const std::uint8_t* mask, std::size_t width, int y, Run* ru
         std::uint64_t word = 0;
         std::memcpy(&word, mask + x, sizeof word);
         if (word == (open != 0 ? ~std::uint64_t{0} : 0)) continue;
-        const std::uint32_t bits = packed(word);
+        const std::uint32_t bits = packed_bytes(word);
         std::uint32_t changes = (bits ^ (bits << 1 | open)) & 0xFFU;
         for (; changes != 0; changes &= changes - 1) {
             const std::size_t at = x + static_cast<std::size_t>(std::countr_zero(changes));
@@ -224,7 +219,10 @@ std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, 
     for (int y = 0; y < image.height_px; ++y) {
         if (y % kBlock == 0) {
             const std::uint8_t* row = &thresholds.values[static_cast<std::size_t>(y / kBlock) * blocks];
-            for (std::size_t b = 0; b < blocks; ++b) std::memset(&levels[b * kBlockPx], row[b], kBlockPx);
+            for (std::size_t b = 0; b < blocks; ++b) {
+                const std::uint32_t four_times = row[b] * 0x01010101U;
+                std::memcpy(&levels[b * kBlockPx], &four_times, kBlockPx);
+            }
         }
         if (runs.size() - count < width / 2 + 1) {  // the most runs a row can have
             truncated = true;

@@ -6,8 +6,9 @@ namespace rig {
 
 namespace {
 
-constexpr double kSmallestDepthShare = 1e-6;  // of a marker's mean information: below it the depth was not measured
-constexpr double kWeakPrior = 0.01;           // of a marker's mean information
+constexpr double kSmallestDepthShare =
+    1e-6;                            // of a marker's mean information: below it the depth was not measured
+constexpr double kWeakPrior = 0.01;  // of a marker's mean information
 
 }  // namespace
 
@@ -27,7 +28,8 @@ void infer_missing(const ShapeModel& model, const StabiliserOutput& stabilised, 
         // A weak prior decides only what was not measured.
         const Mat3 system = marker.information + kWeakPrior * mean * Mat3::Identity();
         const Vec3 offset = marker.information * (marker.position_mm - inferred);
-        output.position_mm[k] = full_rank ? marker.position_mm : Vec3{inferred + inverse_3x3(system) * offset};
+        output.position_mm[k] =
+            full_rank ? marker.position_mm : Vec3{inferred + inverse_3x3(system) * offset};
     }
 }
 

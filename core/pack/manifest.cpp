@@ -59,6 +59,14 @@ CameraModel camera_from(const fb::Camera& stored) {
     return camera;
 }
 
+// The verifier of FlatBuffers sees to the alignment of a vector's length, not to that of its structs. An
+// empty one has none to align.
+template <class T>
+bool is_aligned(const flatbuffers::Vector<const T*>* structs) {
+    return structs == nullptr || structs->size() == 0 ||
+           reinterpret_cast<std::uintptr_t>(structs->Data()) % alignof(T) == 0;
+}
+
 Result<void, PackError> read_identity(const fb::Manifest& stored, PackManifest& out) {
     for (std::uint16_t i = 0; i < 16; ++i) out.uuid[i] = stored.uuid()->bytes()->Get(i);
     out.name = {stored.name()->c_str(), stored.name()->size()};
@@ -243,6 +251,8 @@ Result<PackManifest, PackError> read_manifest(ByteSpan bytes, HashFunction hash)
     flatbuffers::Verifier verifier(data, raw.size(), /*max_depth=*/8, /*max_tables=*/64);
     if (raw.size() < 8 || !fb::VerifyManifestBuffer(verifier)) return failure(PackError::kManifestStructure);
     const fb::Manifest& stored = *fb::GetManifest(data);
+    if (!is_aligned(stored.sections()) || !is_aligned(stored.cameras()))
+        return failure(PackError::kManifestStructure);
 
     if (auto ok = read_identity(stored, out); !ok) return failure(ok.error());
     if (auto ok = read_sections(bytes, stored, out); !ok) return failure(ok.error());

@@ -15,8 +15,8 @@ namespace rig {
 enum class LossPolicy : std::uint8_t { kHold = 0, kDecay = 1 };
 
 struct PipelineConfig {
-    bool stabilise = true;       // false: input is already in the face frame
-    bool filter = true;          // smoothing and recovery blends; a temporal prior in the pack stays on either way
+    bool stabilise = true;  // false: input is already in the face frame
+    bool filter = true;     // smoothing and recovery blends; a temporal prior in the pack stays on either way
     LossPolicy loss_policy = LossPolicy::kHold;
     MarkerPolarity polarity = MarkerPolarity::kAuto;
     double rate_hz = 60.0;
@@ -38,13 +38,15 @@ struct ObservationFrame {
     std::uint8_t camera_count = 0;
 };
 
-// One tick of a labelled marker stream: entry k is marker k of the pack; a non-finite coordinate means not seen.
+// One tick of a labelled marker stream: entry k is marker k of the pack; a non-finite coordinate means not
+// seen.
 struct LabelledFrame {
     std::int64_t capture_us = 0;
     std::span<const Vec3> positions_mm;
 };
 
-// One tick of an unlabelled stream: points in any order, ghosts among them; a non-finite point is an empty slot.
+// One tick of an unlabelled stream: points in any order, ghosts among them; a non-finite point is an empty
+// slot.
 struct PointFrame {
     std::int64_t capture_us = 0;
     std::span<const Vec3> positions_mm;
@@ -52,8 +54,8 @@ struct PointFrame {
 
 struct FrameReport {
     // solve certificate
-    double kkt = 0.0;              // largest move of a projected Jacobi step; dimensionless
-    double objective_mm2 = 0.0;    // E at the answer
+    double kkt = 0.0;            // largest move of a projected Jacobi step; dimensionless
+    double objective_mm2 = 0.0;  // E at the answer
     std::uint16_t iterations = 0;
     std::uint16_t markers_used = 0;
     double residual_rms_mm = 0.0;  // over the coordinates of the markers used
@@ -65,8 +67,9 @@ struct FrameReport {
     std::uint16_t markers_seen = 0;
     std::uint16_t swaps_repaired = 0;
     std::uint16_t names_rejected = 0;
-    bool bootstrapped = false;     // identities were found anew in this frame
-    std::array<std::int16_t, kMaxPoints> labels{};  // PointFrame input: the marker each point was taken for, -1 none
+    bool bootstrapped = false;  // identities were found anew in this frame
+    std::array<std::int16_t, kMaxPoints>
+        labels{};  // PointFrame input: the marker each point was taken for, -1 none
     // stabilised, completed markers in the face frame, mm; [marker_count]
     std::array<Vec3, kMaxMarkers> face_markers_mm{};
 };

@@ -28,7 +28,8 @@ void climb(const LadderConfig& config, const LadderInput& input, LadderState& s)
 
 void fall(const LadderConfig& config, const LadderInput& input, LadderState& s) {
     const auto three_frames_us = static_cast<std::int64_t>(3e6 / config.rate_hz);
-    if (input.now_us < s.last_usable_us) s.last_usable_us = input.now_us;  // the clock went back: count from there
+    if (input.now_us < s.last_usable_us)
+        s.last_usable_us = input.now_us;  // the clock went back: count from there
     const std::int64_t silent_us = elapsed_us(s.last_usable_us, input.now_us);
     if (silent_us < std::max(config.hold_after_us, three_frames_us)) return;
     if (s.state > TrackingState::kHold) s.state = TrackingState::kHold;

@@ -11,13 +11,13 @@ namespace rig {
 
 namespace {
 
-constexpr double kCentreSigmaPx = 0.15;             // of a detected centre: measured on rendered frames, blur and noise
-constexpr double kNominalDepthMm = 200.0;           // helmet camera to face, when the calibration does not tell
-constexpr std::int64_t kDecayUs = 400'000;          // to the rest pose, policy kDecay
-constexpr double kSlipAlarmRad = 0.07;              // about 4 degrees: re-seat the rig
+constexpr double kCentreSigmaPx = 0.15;  // of a detected centre: measured on rendered frames, blur and noise
+constexpr double kNominalDepthMm = 200.0;   // helmet camera to face, when the calibration does not tell
+constexpr std::int64_t kDecayUs = 400'000;  // to the rest pose, policy kDecay
+constexpr double kSlipAlarmRad = 0.07;      // about 4 degrees: re-seat the rig
 constexpr double kSlipAlarmMm = 8.0;
-constexpr float kObservable = 0.5F;                 // confidence, everything visible, from which a shape counts as seen
-constexpr float kPartialShare = 0.5F;               // of that confidence, under which its region is not seen any more
+constexpr float kObservable = 0.5F;    // confidence, everything visible, from which a shape counts as seen
+constexpr float kPartialShare = 0.5F;  // of that confidence, under which its region is not seen any more
 
 bool usable_status(CameraStatus status) {
     return status == CameraStatus::kGood || status == CameraStatus::kExposure;
@@ -40,7 +40,8 @@ void write_slip(const Rigid& pose, Slip& slip) {
 Result<void, PipelineError> Pipeline::configure(const SolvePack& pack, const PipelineConfig& config) {
     configured_ = false;
     const bool counts = pack.marker_count >= kMinMarkers && pack.marker_count <= kMaxMarkers &&
-                        pack.shape_count >= 1 && pack.shape_count <= kMaxShapes && pack.camera_count <= kMaxCameras;
+                        pack.shape_count >= 1 && pack.shape_count <= kMaxShapes &&
+                        pack.camera_count <= kMaxCameras;
     const std::size_t rows = 3U * pack.marker_count;
     if (!counts || pack.neutral_mm.size() != rows || pack.basis_mm.size() != rows * pack.shape_count) {
         return failure(PipelineError::kPackLimits);
@@ -48,7 +49,8 @@ Result<void, PipelineError> Pipeline::configure(const SolvePack& pack, const Pip
     if (!(config.rate_hz >= 1.0 && config.rate_hz <= 1000.0)) return failure(PipelineError::kRate);
     config_ = config;
     pack_ = pack;
-    build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, model_workspace_, model_);
+    build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, model_workspace_,
+                      model_);
     configure_solver(pack, config.rate_hz, solver_workspace_, solver_config_);
     configure_stages(config);
     for (std::size_t i = 0; i < pack.shape_count; ++i) sent_[i] = rest(pack, i);
@@ -114,15 +116,20 @@ void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& rep
     state.capture_us = capture_us;
     state.shape_count = configured_ ? pack_.shape_count : std::uint16_t{0};
     for (std::size_t c = 0; c < kMaxCameras; ++c) {
-        state.cameras[c] = c < pack_.camera_count && configured_ ? CameraStatus::kMissing : CameraStatus::kUnused;
+        state.cameras[c] =
+            c < pack_.camera_count && configured_ ? CameraStatus::kMissing : CameraStatus::kUnused;
     }
     sightings_.clear();
+    named_ = NamedMarkers{};  // a tick without pictures has no markers, not the last ones
     named_.capture_us = capture_us;
+    named_.count = configured_ ? pack_.marker_count : std::uint16_t{0};
 }
 
-void Pipeline::take_observations(std::size_t camera, std::span<const Observation> observations, FrameReport& report) {
+void Pipeline::take_observations(std::size_t camera, std::span<const Observation> observations,
+                                 FrameReport& report) {
     report.observations[camera] = static_cast<std::uint16_t>(observations.size());
-    add_camera_view(pack_.cameras[camera], observations, kCentreSigmaPx, camera_depth_mm_[camera], sightings_);
+    add_camera_view(pack_.cameras[camera], observations, kCentreSigmaPx, camera_depth_mm_[camera],
+                    sightings_);
 }
 
 void Pipeline::track_sightings(FrameReport& report) {
@@ -181,8 +188,8 @@ void Pipeline::step(const LabelledFrame& frame, FaceState& state, FrameReport& r
     begin(frame.capture_us, state, report);
     bool usable = configured_ && frame.positions_mm.size() == pack_.marker_count;
     if (usable) {
-        check_names(model_, tracker_config_, frame.positions_mm, static_cast<double>(pack_.noise_mm), tracker_,
-                    tracker_workspace_, sightings_, named_, track_report_);
+        check_names(model_, tracker_config_, frame.positions_mm, static_cast<double>(pack_.noise_mm),
+                    tracker_, tracker_workspace_, sightings_, named_, track_report_);
         report.markers_seen = track_report_.seen;
         report.swaps_repaired = track_report_.swaps_repaired;
         report.names_rejected = track_report_.rejected;
@@ -216,9 +223,11 @@ void Pipeline::idle(std::int64_t now_us, FaceState& state, FrameReport& report) 
 }
 
 void Pipeline::solve_named(std::int64_t capture_us, FrameReport& report) {
-    stabilise(model_, stabiliser_config_, named_, stabiliser_, stabiliser_workspace_, stabilised_, stabiliser_report_);
+    stabilise(model_, stabiliser_config_, named_, stabiliser_, stabiliser_workspace_, stabilised_,
+              stabiliser_report_);
     infer_missing(model_, stabilised_, completed_);
-    solve(solver_config_, stabilised_, completed_, capture_us, solver_, solver_workspace_, solved_, solver_report_);
+    solve(solver_config_, stabilised_, completed_, capture_us, solver_, solver_workspace_, solved_,
+          solver_report_);
     report.solved = solver_report_.solved;
     report.kkt = solver_report_.kkt;
     report.objective_mm2 = solver_report_.objective_mm2;
@@ -227,7 +236,8 @@ void Pipeline::solve_named(std::int64_t capture_us, FrameReport& report) {
     report.residual_rms_mm = solver_report_.residual_rms_mm;
     report.hull_distance = solver_report_.hull_distance;
     report.optimal = solver_report_.optimal;
-    for (std::size_t k = 0; k < pack_.marker_count; ++k) report.face_markers_mm[k] = completed_.position_mm[k];
+    for (std::size_t k = 0; k < pack_.marker_count; ++k)
+        report.face_markers_mm[k] = completed_.position_mm[k];
 }
 
 bool Pipeline::is_partial(const FaceState& state) const {
@@ -272,8 +282,8 @@ void Pipeline::put_out(std::int64_t capture_us, bool usable, FaceState& state) {
             recovery_.phase = RecoveryPhase::kLive;
             recovery.phase = RecoveryPhase::kLive;
         } else {
-            blend_recovery(recovery_config_, up, wanted, {sent_.data(), n}, capture_us, recovery_, {sent_.data(), n},
-                           recovery);
+            blend_recovery(recovery_config_, up, wanted, {sent_.data(), n}, capture_us, recovery_,
+                           {sent_.data(), n}, recovery);
         }
         was_live_ = was_live_ || up;
         state.held = recovery.phase == RecoveryPhase::kHeld;
@@ -298,9 +308,11 @@ void Pipeline::hold(std::int64_t capture_us, FaceState& state) {
     if (sent_any_) state.capture_us = sent_us_;
     write_slip(stabilised_.headset_from_face, state.slip);
     if (ladder_.state <= TrackingState::kHold) reset_recovery(recovery_);
-    if (ladder_.state != TrackingState::kLost || config_.loss_policy != LossPolicy::kDecay) return;
+    if (!ladder_.ever_usable || ladder_.state != TrackingState::kLost) return;
+    if (config_.loss_policy != LossPolicy::kDecay) return;
     const std::int64_t since_us = elapsed_us(last_usable_us_, capture_us) - ladder_config_.lost_after_us;
-    const double left = 1.0 - std::clamp(static_cast<double>(since_us) / static_cast<double>(kDecayUs), 0.0, 1.0);
+    const double left =
+        1.0 - std::clamp(static_cast<double>(since_us) / static_cast<double>(kDecayUs), 0.0, 1.0);
     for (std::size_t i = 0; i < pack_.shape_count; ++i) {
         sent_[i] = rest(pack_, i) + left * (lost_from_[i] - rest(pack_, i));
     }
@@ -320,7 +332,8 @@ void Pipeline::raise_faults(bool usable, const FrameReport& report, FaceState& s
     raise(state.state == TrackingState::kPartial, Fault::kMarkersMissing);
     raise(report.swaps_repaired > 0 || report.names_rejected > 0, Fault::kMarkerSwap);
     raise(!report.optimal, Fault::kSolveWeak);
-    raise(stabiliser_report_.slip_rotation_rad > kSlipAlarmRad || stabiliser_report_.slip_translation_mm > kSlipAlarmMm,
+    raise(stabiliser_report_.slip_rotation_rad > kSlipAlarmRad ||
+              stabiliser_report_.slip_translation_mm > kSlipAlarmMm,
           Fault::kRigMoved);
 }
 

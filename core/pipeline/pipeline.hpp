@@ -1,5 +1,5 @@
-// Puts the stages in order: a frame in, a FaceState and a FrameReport out. The only part of core that sees every stage.
-// Not for: time, threads, files, links; those belong to the programs.
+// Puts the stages in order: a frame in, a FaceState and a FrameReport out. The only part of core that sees
+// every stage. Not for: time, threads, files, links; those belong to the programs.
 #pragma once
 
 #include <array>
@@ -21,16 +21,16 @@ namespace rig {
 
 enum class PipelineError : std::uint8_t { kPackLimits, kRate };
 
-// About 30 MB, all of it inside the object: a program places it before seal(), never on a stack. step() and idle() never
-// allocate. The pack's bytes outlive it. One thread uses a pipeline.
+// About 11 MB, all of it inside the object: a program places it before seal(), never on a stack. step() and
+// idle() never allocate. The pack's bytes outlive it. One thread uses a pipeline.
 class Pipeline {
   public:
-    // `pack` as open_pack() returned it: its numbers are checked already. On failure, and before the first success, the
-    // pipeline is in SAFE and every step yields the rest pose.
+    // `pack` as open_pack() returned it: its numbers are checked already. On failure, and before the first
+    // success, the pipeline is in SAFE and every step yields the rest pose.
     [[nodiscard]] Result<void, PipelineError> configure(const SolvePack& pack, const PipelineConfig& config);
 
-    // One tick each; `state` and `report` are overwritten. state.sequence is counted here; state.age_us is the
-    // caller's to fill when it encodes.
+    // One tick each; `state` and `report` are overwritten. state.sequence is counted here; state.age_us is
+    // the caller's to fill when it encodes.
     void step(const FrameSet& frame, FaceState& state, FrameReport& report);
     void step(const ObservationFrame& frame, FaceState& state, FrameReport& report);
     void step(const LabelledFrame& frame, FaceState& state, FrameReport& report);
@@ -46,13 +46,16 @@ class Pipeline {
     [[nodiscard]] const NamedMarkers& named_markers() const { return named_; }
     // Which observation of each camera each marker was taken for, -1 none.
     [[nodiscard]] const Matches& matches() const { return track_report_.matches; }
-    [[nodiscard]] const DetectorReport& detector_report(std::size_t camera) const { return detector_reports_[camera]; }
+    [[nodiscard]] const DetectorReport& detector_report(std::size_t camera) const {
+        return detector_reports_[camera];
+    }
 
   private:
     void configure_stages(const PipelineConfig& config);
     void forget();
     void begin(std::int64_t capture_us, FaceState& state, FrameReport& report);
-    void take_observations(std::size_t camera, std::span<const Observation> observations, FrameReport& report);
+    void take_observations(std::size_t camera, std::span<const Observation> observations,
+                           FrameReport& report);
     void track_sightings(FrameReport& report);
     void solve_named(std::int64_t capture_us, FrameReport& report);
     void finish(std::int64_t capture_us, bool usable, FaceState& state, FrameReport& report);
@@ -107,7 +110,8 @@ class Pipeline {
     std::int64_t sent_us_ = 0;         // capture time of the frame behind sent_
     std::array<double, kMaxShapes> smoothed_{};
     std::array<double, kMaxShapes> sent_{};  // the weights last put out
-    std::array<double, kMaxShapes> lost_from_{};  // ... when the face was lost: where the decay to rest starts
+    std::array<double, kMaxShapes>
+        lost_from_{};  // ... when the face was lost: where the decay to rest starts
 };
 
 }  // namespace rig

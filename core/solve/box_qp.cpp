@@ -58,9 +58,10 @@ bool free_step(const BoxQpProblem& p, std::size_t count, BoxQpWorkspace& ws) {
     return true;
 }
 
-// Walks along the step as far as the bounds allow. The variable that reaches its bound first is fixed there, and the
-// next iteration takes a step with the others; returns true for a full step.
-bool walk(const BoxQpProblem& p, std::size_t count, BoxQpState& state, BoxQpWorkspace& ws, std::span<double> w) {
+// Walks along the step as far as the bounds allow. The variable that reaches its bound first is fixed there,
+// and the next iteration takes a step with the others; returns true for a full step.
+bool walk(const BoxQpProblem& p, std::size_t count, BoxQpState& state, BoxQpWorkspace& ws,
+          std::span<double> w) {
     double length = 1.0;
     std::size_t blocking = count;
     for (std::size_t a = 0; a < count; ++a) {
@@ -85,7 +86,8 @@ bool walk(const BoxQpProblem& p, std::size_t count, BoxQpState& state, BoxQpWork
     return false;
 }
 
-// The bound variable whose multiplier has the wrong sign by most, measured as the move it would make; N when none.
+// The bound variable whose multiplier has the wrong sign by most, measured as the move it would make; N when
+// none.
 std::size_t worst_multiplier(const BoxQpProblem& p, const BoxQpState& state, std::span<const double> gradient,
                              double tolerance) {
     std::size_t worst = p.size;
@@ -102,7 +104,8 @@ std::size_t worst_multiplier(const BoxQpProblem& p, const BoxQpState& state, std
     return worst;
 }
 
-double projected_jacobi_move(const BoxQpProblem& p, std::span<const double> w, std::span<const double> gradient) {
+double projected_jacobi_move(const BoxQpProblem& p, std::span<const double> w,
+                             std::span<const double> gradient) {
     double largest = 0.0;
     for (std::size_t i = 0; i < p.size; ++i) {
         const double target = std::clamp(w[i] - gradient[i] / row(p, i)[i], p.low[i], p.high[i]);

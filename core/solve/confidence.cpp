@@ -13,7 +13,8 @@ void weight_confidence(const ConfidenceInput& input, ConfidenceWorkspace& w, std
     const double s2 = input.noise_mm * input.noise_mm;
     for (std::size_t i = 0; i < n; ++i) {
         const double sigma = static_cast<double>(input.prior_sigma[i]);
-        for (std::size_t j = 0; j < i; ++j) w.posterior[i * kStride + j] = input.gram_mm2[i * kStride + j] / s2;
+        for (std::size_t j = 0; j < i; ++j)
+            w.posterior[i * kStride + j] = input.gram_mm2[i * kStride + j] / s2;
         w.posterior[i * kStride + i] = input.diagonal_mm2[i] / s2 + 1.0 / (sigma * sigma);
         confidence[i] = 0.0F;
     }

@@ -13,7 +13,8 @@
 namespace rig {
 
 struct ConfidenceInput {
-    std::span<const double> gram_mm2;   // B^T V B, lower triangle, rows kMaxShapes apart; its diagonal is not read
+    std::span<const double>
+        gram_mm2;  // B^T V B, lower triangle, rows kMaxShapes apart; its diagonal is not read
     std::span<const double> diagonal_mm2;  // [N] the diagonal of B^T V B
     std::span<const float> prior_sigma;    // [N] sqrt of P0_ii, > 0
     double noise_mm = 0.1;                 // s
@@ -26,6 +27,7 @@ struct ConfidenceWorkspace {
 };
 
 // confidence [N], 0..1; all zero when the posterior is not positive definite.
-void weight_confidence(const ConfidenceInput& input, ConfidenceWorkspace& workspace, std::span<float> confidence);
+void weight_confidence(const ConfidenceInput& input, ConfidenceWorkspace& workspace,
+                       std::span<float> confidence);
 
 }  // namespace rig

@@ -23,7 +23,8 @@ std::size_t fill_input(const SolverConfig& config, const StabiliserOutput& stabi
         if (!marker.seen) continue;
         ++seen;
         w.weights[k] = s2 * marker.information;
-        // A 3D stream's marker comes back from the rotation within rounding of I: say so, it is the fast case.
+        // A 3D stream's marker comes back from the rotation within rounding of I: say so, it is the fast
+        // case.
         if ((w.weights[k] - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-6) w.weights[k] = Mat3::Identity();
     }
     return seen;
@@ -50,10 +51,11 @@ double gamma_scale(const SolverConfig& config, const SolverState& state, std::in
     return 1.0 / std::max(1.0, gap_s * config.rate_hz);
 }
 
-constexpr double kSameInformation = 0.05;  // of the trace: a ray turns by less while a marker moves about its place
+constexpr double kSameInformation =
+    0.05;  // of the trace: a ray turns by less while a marker moves about its place
 
-// Confidence depends on what is seen and from where, not on where it is, so it is kept until that changes: a marker
-// comes or goes, or a camera does.
+// Confidence depends on what is seen and from where, not on where it is, so it is kept until that changes: a
+// marker comes or goes, or a camera does.
 void update_confidence(const SolverConfig& config, SolverState& state, SolverWorkspace& w) {
     const SolvePack& pack = config.pack;
     bool same = state.has_confidence;
@@ -83,11 +85,12 @@ void run_quadratic(const SolverConfig& config, SolverState& state, SolverWorkspa
     report.objective_mm2 = 2.0 * qp.objective + w.equations.constant_mm2;
 }
 
-void run_rbf(const SolverConfig& config, const InferenceOutput& completed, SolverWorkspace& w, SolverOutput& output,
-             SolverReport& report) {
+void run_rbf(const SolverConfig& config, const InferenceOutput& completed, SolverWorkspace& w,
+             SolverOutput& output, SolverReport& report) {
     for (std::size_t k = 0; k < config.pack.marker_count; ++k) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            w.flat_mm[3 * k + axis] = static_cast<float>(completed.position_mm[k][static_cast<Eigen::Index>(axis)]);
+            w.flat_mm[3 * k + axis] =
+                static_cast<float>(completed.position_mm[k][static_cast<Eigen::Index>(axis)]);
         }
     }
     const RbfReport rbf = evaluate_rbf(config.pack, {w.flat_mm.data(), 3U * config.pack.marker_count}, w.rbf,
@@ -98,15 +101,16 @@ void run_rbf(const SolverConfig& config, const InferenceOutput& completed, Solve
 
 }  // namespace
 
-void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& workspace, SolverConfig& config) {
+void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& workspace,
+                      SolverConfig& config) {
     config.pack = pack;
     config.rate_hz = rate_hz;
     build_normal_tables(pack, config.tables);
     for (std::size_t i = 0; i < pack.shape_count; ++i) {
         workspace.equations.data_diagonal[i] = config.tables.full_gram[i * kMaxShapes + i];
     }
-    const ConfidenceInput everything{config.tables.full_gram, workspace.equations.data_diagonal, pack.prior_sigma,
-                                     static_cast<double>(pack.noise_mm)};
+    const ConfidenceInput everything{config.tables.full_gram, workspace.equations.data_diagonal,
+                                     pack.prior_sigma, static_cast<double>(pack.noise_mm)};
     weight_confidence(everything, workspace.confidence, config.full_confidence);
 }
 
@@ -122,8 +126,8 @@ void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const
     const std::size_t n = pack.shape_count;
     if (!state.has_previous) {
         for (std::size_t i = 0; i < n; ++i) {
-            state.previous[i] =
-                std::clamp(0.0, static_cast<double>(pack.weight_low[i]), static_cast<double>(pack.weight_high[i]));
+            state.previous[i] = std::clamp(0.0, static_cast<double>(pack.weight_low[i]),
+                                           static_cast<double>(pack.weight_high[i]));
         }
     }
     const std::size_t seen = fill_input(config, stabilised, w);

@@ -8,8 +8,8 @@ namespace rig {
 
 namespace {
 
-// mm and rad: a pose that must not move. Its square beside a mode's prior of 1 has to stay within the 14 digits that
-// the Cholesky factor asks for, or the fit is refused and nothing is inferred.
+// mm and rad: a pose that must not move. Its square beside a mode's prior of 1 has to stay within the 14
+// digits that the Cholesky factor asks for, or the fit is refused and nothing is inferred.
 constexpr double kHeldSigma = 1e-6;
 
 std::size_t fill_input(const NamedMarkers& named, StabiliserWorkspace& w) {
@@ -61,8 +61,8 @@ bool moved_too_far(const StabiliserConfig& config, const Rigid& from, const Rigi
 }
 
 // `fit` is the start on entry and the answer on return.
-void fit_pose(const ShapeModel& model, const StabiliserConfig& config, std::size_t count, const StabiliserState& state,
-              StabiliserWorkspace& w, ShapeFit& fit, StabiliserReport& report) {
+void fit_pose(const ShapeModel& model, const StabiliserConfig& config, std::size_t count,
+              const StabiliserState& state, StabiliserWorkspace& w, ShapeFit& fit, StabiliserReport& report) {
     const std::span<const Vec3> positions(w.positions_mm.data(), count);
     const std::span<const Mat3> informations(w.informations.data(), count);
     const ShapeFit start = fit;
@@ -88,7 +88,8 @@ void reset_stabiliser(StabiliserState& state) {
 }
 
 void stabilise(const ShapeModel& model, const StabiliserConfig& config, const NamedMarkers& named,
-               StabiliserState& state, StabiliserWorkspace& w, StabiliserOutput& output, StabiliserReport& report) {
+               StabiliserState& state, StabiliserWorkspace& w, StabiliserOutput& output,
+               StabiliserReport& report) {
     report = StabiliserReport{};
     const std::size_t seen = fill_input(named, w);
     output.fit = state.warm && config.enabled ? state.fit : nominal_fit(config);

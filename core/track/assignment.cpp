@@ -10,7 +10,8 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::max();
 
-// Rows and columns count from 1; 0 is the start of every path. Column column_count + r is row r's own "alone" column.
+// Rows and columns count from 1; 0 is the start of every path. Column column_count + r is row r's own "alone"
+// column.
 double entry(const AssignmentProblem& p, std::size_t row, std::size_t column) {
     if (column > p.column_count) return column - p.column_count == row ? p.alone_cost : kInfinite;
     const double cost = p.cost[(row - 1) * p.column_count + (column - 1)];
@@ -56,7 +57,8 @@ std::size_t grow_path(const AssignmentProblem& p, std::size_t columns, Assignmen
 
 }  // namespace
 
-void solve_assignment(const AssignmentProblem& problem, AssignmentWorkspace& w, std::span<std::int16_t> column_of) {
+void solve_assignment(const AssignmentProblem& problem, AssignmentWorkspace& w,
+                      std::span<std::int16_t> column_of) {
     const std::size_t rows = problem.row_count;
     const std::size_t columns = problem.column_count + rows;
     RIG_CHECK(rows <= kMaxAssignmentRows && problem.column_count <= kMaxAssignmentColumns);

@@ -1,5 +1,5 @@
-// Which row goes with which column, each at most once, at the least total cost; a row may stay alone at a price.
-// Exact (shortest augmenting paths with potentials, the Hungarian method's O(rows^2 columns) form).
+// Which row goes with which column, each at most once, at the least total cost; a row may stay alone at a
+// price. Exact (shortest augmenting paths with potentials, the Hungarian method's O(rows^2 columns) form).
 #pragma once
 
 #include <array>

@@ -6,25 +6,33 @@ namespace rig {
 
 namespace {
 
-// Each round's gate, and how freely the expression may move in it. Found on the public marker streams with starts up
-// to 15 mm off: fewer rounds lose the lips, a first gate under 12 mm loses large slips.
+// Each round's gate, and how freely the expression may move in it. Found on the public marker streams with
+// starts up to 15 mm off: fewer rounds lose the lips, a first gate under 12 mm loses large slips.
 struct Round {
     double gate_mm;
     double coefficient_sigma;
 };
-constexpr std::array<Round, 9> kRounds{{{16.0, 0.25}, {14.0, 0.4}, {12.0, 0.6}, {10.0, 0.8}, {8.0, 1.0},
-                                        {6.0, 1.5},   {5.0, 2.0},  {4.0, 2.0},  {3.0, 2.0}}};
+constexpr std::array<Round, 9> kRounds{{{16.0, 0.25},
+                                        {14.0, 0.4},
+                                        {12.0, 0.6},
+                                        {10.0, 0.8},
+                                        {8.0, 1.0},
+                                        {6.0, 1.5},
+                                        {5.0, 2.0},
+                                        {4.0, 2.0},
+                                        {3.0, 2.0}}};
 constexpr double kGapLimitMm = 2.0;
 
 // Start i of the grid: the nominal pose first, then its 26 neighbours, nearest first.
 Vec3 start_offset(std::size_t index, double spacing_mm) {
     static constexpr std::array<std::array<int, 3>, 27> kOrder{
-        {{0, 0, 0},   {0, 1, 0},   {0, -1, 0},  {1, 0, 0},   {-1, 0, 0},  {0, 0, 1},   {0, 0, -1},
-         {1, 1, 0},   {-1, 1, 0},  {1, -1, 0},  {-1, -1, 0}, {0, 1, 1},   {0, -1, 1},  {0, 1, -1},
-         {0, -1, -1}, {1, 0, 1},   {-1, 0, 1},  {1, 0, -1},  {-1, 0, -1}, {1, 1, 1},   {-1, 1, 1},
-         {1, -1, 1},  {-1, -1, 1}, {1, 1, -1},  {-1, 1, -1}, {1, -1, -1}, {-1, -1, -1}}};
+        {{0, 0, 0},   {0, 1, 0},   {0, -1, 0}, {1, 0, 0},   {-1, 0, 0},  {0, 0, 1},   {0, 0, -1},
+         {1, 1, 0},   {-1, 1, 0},  {1, -1, 0}, {-1, -1, 0}, {0, 1, 1},   {0, -1, 1},  {0, 1, -1},
+         {0, -1, -1}, {1, 0, 1},   {-1, 0, 1}, {1, 0, -1},  {-1, 0, -1}, {1, 1, 1},   {-1, 1, 1},
+         {1, -1, 1},  {-1, -1, 1}, {1, 1, -1}, {-1, 1, -1}, {1, -1, -1}, {-1, -1, -1}}};
     const auto& at = kOrder[index % kOrder.size()];
-    return spacing_mm * Vec3{static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
+    return spacing_mm *
+           Vec3{static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
 }
 
 void predict(const ShapeModel& model, const ShapeFit& fit, BootstrapWorkspace& w) {
@@ -63,8 +71,8 @@ void run_rounds(const ShapeModel& model, const BootstrapConfig& config, const Ri
         fill_fit_input(model, round.gate_mm, w);
         prior.coefficient_sigma = round.coefficient_sigma;
         const ShapeFit before = w.trial;
-        fit_shape(model, {w.positions_mm.data(), model.marker_count}, {w.informations.data(), model.marker_count}, prior,
-                  2, before, w.fit, w.trial);
+        fit_shape(model, {w.positions_mm.data(), model.marker_count},
+                  {w.informations.data(), model.marker_count}, prior, 2, before, w.fit, w.trial);
     }
     predict(model, w.trial, w);
     match_views(predicted(model, w), sightings, kRounds.back().gate_mm, w.matching, w.matches);
@@ -91,7 +99,8 @@ BootstrapReport judge(const ShapeModel& model, const BootstrapConfig& config, co
     report.residual_mm = report.seen == 0 ? 0.0 : std::sqrt(sum / report.seen);
     report.found = w.trial.ok && report.seen >= kMinMarkers &&
                    report.seen >= config.accept_seen * static_cast<double>(model.marker_count) &&
-                   report.explained >= config.accept_explained && report.residual_mm <= config.accept_residual_mm;
+                   report.explained >= config.accept_explained &&
+                   report.residual_mm <= config.accept_residual_mm;
     return report;
 }
 

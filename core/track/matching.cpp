@@ -10,7 +10,8 @@ namespace rig {
 namespace {
 
 constexpr double kDepthPriorSigmaMm = 3.0;  // of a predicted depth along a single ray
-constexpr double kMostPriorShare = 1e-3;    // of what a sighting measures: a prediction never pulls a measured point
+constexpr double kMostPriorShare =
+    1e-3;  // of what a sighting measures: a prediction never pulls a measured point
 
 using MarkerSightings = BoundedVector<Sighting, kMaxCameras>;
 
@@ -31,13 +32,15 @@ double prior_information(const MarkerSightings& mine) {
 }
 
 // Takes away the match that lies farthest from the prediction.
-void drop_farthest(const Vec3& predicted_mm, const SightingSet& sightings, std::size_t marker, Matches& matches) {
+void drop_farthest(const Vec3& predicted_mm, const SightingSet& sightings, std::size_t marker,
+                   Matches& matches) {
     std::size_t farthest = sightings.view_count;
     double largest = -1.0;
     for (std::size_t view = 0; view < sightings.view_count; ++view) {
         const std::int16_t at = matches[view][marker];
         if (at < 0) continue;
-        const double d2 = sightings.views[view][static_cast<std::size_t>(at)].squared_distance_mm2(predicted_mm);
+        const double d2 =
+            sightings.views[view][static_cast<std::size_t>(at)].squared_distance_mm2(predicted_mm);
         if (d2 > largest) {
             largest = d2;
             farthest = view;

@@ -11,10 +11,10 @@ namespace rig {
 
 struct NamedMarker {
     bool seen = false;
-    std::uint8_t views = 0;            // cameras that saw it; 0 for 3D input streams
-    Vec3 position_mm = Vec3::Zero();   // headset frame, before stabilisation; valid when seen
-    // Inverse covariance of position_mm, 1/mm^2. Rank 3 from two cameras or a 3D stream; rank 2 from one camera,
-    // when the depth of position_mm along the ray is only predicted.
+    std::uint8_t views = 0;           // cameras that saw it; 0 for 3D input streams
+    Vec3 position_mm = Vec3::Zero();  // headset frame, before stabilisation; valid when seen
+    // Inverse covariance of position_mm, 1/mm^2. Rank 3 from two cameras or a 3D stream; rank 2 from one
+    // camera, when the depth of position_mm along the ray is only predicted.
     Mat3 information = Mat3::Zero();
 };
 

@@ -10,7 +10,8 @@ namespace rig {
 
 namespace {
 
-constexpr double kBiasLearning = 0.02;  // per frame: follows a head the model does not quite fit within a second
+constexpr double kBiasLearning =
+    0.02;  // per frame: follows a head the model does not quite fit within a second
 
 std::span<const Vec3> predicted(const ShapeModel& model, const TrackerWorkspace& w) {
     return {w.predicted_mm.data(), model.marker_count};
@@ -36,14 +37,15 @@ void predict_motion(const ShapeModel& model, const TrackerConfig& config, const 
     }
 }
 
-void predict_face(const ShapeModel& model, const ShapeFit& fit, const TrackerState& state, TrackerWorkspace& w) {
+void predict_face(const ShapeModel& model, const ShapeFit& fit, const TrackerState& state,
+                  TrackerWorkspace& w) {
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         w.predicted_mm[k] = fit.headset_position(model, k) + state.bias_mm[k];
     }
 }
 
-double residual_of(const ShapeModel& model, const ShapeFit& fit, const TrackerState& state, const NamedMarkers& named,
-                   std::size_t k) {
+double residual_of(const ShapeModel& model, const ShapeFit& fit, const TrackerState& state,
+                   const NamedMarkers& named, std::size_t k) {
     const Vec3 e = named.markers[k].position_mm - fit.headset_position(model, k) - state.bias_mm[k];
     // Only what was measured counts: the depth along a single ray was predicted.
     const double trust = named.markers[k].information.trace();
@@ -113,12 +115,13 @@ void remember(const ShapeModel& model, const NamedMarkers& named, const ShapeFit
     report.residual_mm = report.seen == 0 ? 0.0 : std::sqrt(sum / report.seen);
 }
 
-void count_changes(const ShapeModel& model, const SightingSet& sightings, const Matches& before, const Matches& after,
-                   TrackerReport& report) {
+void count_changes(const ShapeModel& model, const SightingSet& sightings, const Matches& before,
+                   const Matches& after, TrackerReport& report) {
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         bool changed = false;
         for (std::size_t view = 0; view < sightings.view_count; ++view) {
-            changed = changed || (before[view][k] >= 0 && after[view][k] >= 0 && before[view][k] != after[view][k]);
+            changed =
+                changed || (before[view][k] >= 0 && after[view][k] >= 0 && before[view][k] != after[view][k]);
         }
         report.swaps_repaired = static_cast<std::uint16_t>(report.swaps_repaired + (changed ? 1 : 0));
     }
@@ -141,9 +144,11 @@ void begin_tracking(const ShapeModel& model, const ShapeFit& fit, TrackerState& 
     }
 }
 
-void notice_loss(const ShapeModel& model, const TrackerConfig& config, TrackerState& state, TrackerReport& report) {
+void notice_loss(const ShapeModel& model, const TrackerConfig& config, TrackerState& state,
+                 TrackerReport& report) {
     const double needed = std::max(static_cast<double>(kMinMarkers), config.lost_share * model.marker_count);
-    state.poor_frames = report.seen < needed ? static_cast<std::uint16_t>(state.poor_frames + 1) : std::uint16_t{0};
+    state.poor_frames =
+        report.seen < needed ? static_cast<std::uint16_t>(state.poor_frames + 1) : std::uint16_t{0};
     if (state.poor_frames >= config.lost_frames) reset_tracker(state);
     report.tracking = state.tracking;
 }
@@ -159,15 +164,15 @@ void reset_tracker(TrackerState& state) {
     state = TrackerState{};
 }
 
-void track(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings, TrackerState& state,
-           TrackerWorkspace& w, NamedMarkers& named, TrackerReport& report) {
+void track(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings,
+           TrackerState& state, TrackerWorkspace& w, NamedMarkers& named, TrackerReport& report) {
     report = TrackerReport{};
     clear_matches(w.matches);
     clear_named(model, named);
     if (!state.tracking) {
         ShapeFit found;
-        const BootstrapReport start =
-            bootstrap(model, config.bootstrap, config.nominal, sightings, state.bootstrap, w.bootstrap, found);
+        const BootstrapReport start = bootstrap(model, config.bootstrap, config.nominal, sightings,
+                                                state.bootstrap, w.bootstrap, found);
         if (!start.found) {
             report.matches = w.matches;
             return;
@@ -193,8 +198,8 @@ void track(const ShapeModel& model, const TrackerConfig& config, const SightingS
 }
 
 void check_names(const ShapeModel& model, const TrackerConfig& config, std::span<const Vec3> labelled_mm,
-                 double sigma_mm, TrackerState& state, TrackerWorkspace& w, SightingSet& scratch, NamedMarkers& named,
-                 TrackerReport& report) {
+                 double sigma_mm, TrackerState& state, TrackerWorkspace& w, SightingSet& scratch,
+                 NamedMarkers& named, TrackerReport& report) {
     RIG_CHECK(labelled_mm.size() == model.marker_count);
     report = TrackerReport{};
     clear_matches(w.matches);

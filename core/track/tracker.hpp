@@ -1,6 +1,6 @@
-// Observations -> named markers over time. Nobody hands it labels: identities come from the layout's geometry, are
-// carried from frame to frame by prediction and optimal assignment, and are checked against the shape of a face in
-// every frame, so that a swap cannot settle.
+// Observations -> named markers over time. Nobody hands it labels: identities come from the layout's
+// geometry, are carried from frame to frame by prediction and optimal assignment, and are checked against the
+// shape of a face in every frame, so that a swap cannot settle.
 #pragma once
 
 #include <array>
@@ -16,17 +16,17 @@
 namespace rig {
 
 struct TrackerConfig {
-    Rigid nominal;                       // headset_from_face as calibrated
+    Rigid nominal;  // headset_from_face as calibrated
     double rate_hz = 60.0;
-    double first_gate_mm = 6.0;          // around the motion prediction: the largest surprise of a frame
-    double final_gate_mm = 3.0;          // around the fitted face, at least
-    double gap_limit_mm = 1.5;           // between the views of one marker
-    double outlier_mm = 2.5;             // from the fitted face; beyond it a name is doubted
-    double pose_sigma_rad = 0.03;        // per frame, jolts included
+    double first_gate_mm = 6.0;    // around the motion prediction: the largest surprise of a frame
+    double final_gate_mm = 3.0;    // around the fitted face, at least
+    double gap_limit_mm = 1.5;     // between the views of one marker
+    double outlier_mm = 2.5;       // from the fitted face; beyond it a name is doubted
+    double pose_sigma_rad = 0.03;  // per frame, jolts included
     double pose_sigma_mm = 3.0;
-    double expression_sigma = 0.6;       // per frame, in modes' standard deviations
-    double velocity_keep = 0.6;          // of the last step, as the prediction of the next
-    double lost_share = 0.25;            // fewer markers than this share for lost_frames means: start anew
+    double expression_sigma = 0.6;  // per frame, in modes' standard deviations
+    double velocity_keep = 0.6;     // of the last step, as the prediction of the next
+    double lost_share = 0.25;       // fewer markers than this share for lost_frames means: start anew
     std::uint16_t lost_frames = 3;
     BootstrapConfig bootstrap;
 };
@@ -34,10 +34,10 @@ struct TrackerConfig {
 struct TrackerState {
     bool tracking = false;
     std::uint16_t poor_frames = 0;
-    ShapeFit fit;                                     // of the last frame
-    std::array<Vec3, kMaxMarkers> position_mm{};      // last known, headset frame
-    std::array<Vec3, kMaxMarkers> velocity_mm{};      // per frame
-    std::array<Vec3, kMaxMarkers> bias_mm{};          // how a marker differs from the fitted face, slowly learnt
+    ShapeFit fit;                                 // of the last frame
+    std::array<Vec3, kMaxMarkers> position_mm{};  // last known, headset frame
+    std::array<Vec3, kMaxMarkers> velocity_mm{};  // per frame
+    std::array<Vec3, kMaxMarkers> bias_mm{};      // how a marker differs from the fitted face, slowly learnt
     std::array<std::uint16_t, kMaxMarkers> missed{};  // frames since it was last seen
     BootstrapState bootstrap;
 };
@@ -60,18 +60,18 @@ struct TrackerReport {
     std::uint16_t rejected = 0;        // sightings that had a name and lost it
     bool bootstrapped = false;
     bool tracking = false;
-    double residual_mm = 0.0;          // rms distance from the fitted face
+    double residual_mm = 0.0;  // rms distance from the fitted face
     Matches matches{};
 };
 
 void reset_tracker(TrackerState& state);
 
 // One tick of unnamed sightings.
-void track(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings, TrackerState& state,
-           TrackerWorkspace& workspace, NamedMarkers& named, TrackerReport& report);
+void track(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings,
+           TrackerState& state, TrackerWorkspace& workspace, NamedMarkers& named, TrackerReport& report);
 
-// One tick of a stream that claims to know its names: entry k is marker k, non-finite when not seen. Names that the
-// face contradicts are repaired among each other or dropped.
+// One tick of a stream that claims to know its names: entry k is marker k, non-finite when not seen. Names
+// that the face contradicts are repaired among each other or dropped.
 void check_names(const ShapeModel& model, const TrackerConfig& config, std::span<const Vec3> labelled_mm,
                  double sigma_mm, TrackerState& state, TrackerWorkspace& workspace, SightingSet& scratch,
                  NamedMarkers& named, TrackerReport& report);

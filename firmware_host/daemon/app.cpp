@@ -10,6 +10,7 @@ constexpr std::int64_t kLinkPoll_us = 200;
 constexpr std::int64_t kFirstFrame_us =
     10'000'000;  // the clock of a simulation may start well before its first frame
 constexpr int kEdgesPerTick = 16;
+constexpr int kCatchUpFrames = 8;
 
 TickSolverParts solver_parts(const AppParts& parts, const AppConfig& config) {
     return {parts.pipeline, parts.wall, parts.log, parts.pack, config.rate_hz};
@@ -118,11 +119,27 @@ bool App::gather(std::array<std::optional<CameraFrame>, kMaxCameras>& frames) {
         frames[c] = feeds_[c]->take(deadline_us);
         any = any || frames[c].has_value();
     }
-    if (any) return true;
+    if (any) {
+        catch_up(frames);
+        return true;
+    }
     if (is_over()) return false;
     // Nobody has waited when every camera is gone: time has to go on all the same.
     if (parts_.clock.now_us() < deadline_us) parts_.clock.sleep_until_us(deadline_us);
     return !is_over();
+}
+
+// A camera that came back may be a frame behind the others, and would stay so.
+void App::catch_up(std::array<std::optional<CameraFrame>, kMaxCameras>& frames) {
+    std::int64_t newest_us = 0;
+    for (const auto& frame : frames) newest_us = frame ? std::max(newest_us, frame->capture_us) : newest_us;
+    for (std::size_t c = 0; c < feeds_.size(); ++c) {
+        for (int i = 0;
+             i < kCatchUpFrames && frames[c] && 2 * (newest_us - frames[c]->capture_us) > period_us(); ++i) {
+            feeds_[c]->release(*frames[c]);
+            frames[c] = feeds_[c]->take(parts_.clock.now_us());
+        }
+    }
 }
 
 AppEnd App::run_lockstep(const std::atomic<bool>& stop, Hook on_ready, Hook on_leave) {

@@ -81,6 +81,7 @@ class App {
 
     void wait_for_host(const std::atomic<bool>& stop);
     [[nodiscard]] bool gather(std::array<std::optional<CameraFrame>, kMaxCameras>& frames);
+    void catch_up(std::array<std::optional<CameraFrame>, kMaxCameras>& frames);
     void tick(const FrameSet& frames, FaultMap faults);
     [[nodiscard]] FaultMap take_feed_faults();
     void serve_link_until_drained(const std::atomic<bool>& stop);

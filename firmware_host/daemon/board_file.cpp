@@ -54,8 +54,8 @@ std::string read_named(const toml::node_view<const toml::node>& list, const char
 }
 
 std::string read_table(const toml::table& table, Board& board) {
-    const auto key = unknown_key(
-        table, {"name", "rate_hz", "frozen_frames", "watchdog_ms", "default_link", "camera", "line"});
+    const auto key =
+        unknown_key(table, {"name", "rate_hz", "frozen_frames", "default_link", "camera", "line"});
     if (!key.empty()) return fmt::format("there is no key '{}'", key);
     board.name = table["name"].value_or(std::string());
     if (board.name.empty() || board.name.size() > 24) return "'name' must have 1 to 24 bytes";
@@ -64,9 +64,6 @@ std::string read_table(const toml::table& table, Board& board) {
     const auto frozen = table["frozen_frames"].value_or(std::int64_t{3});
     if (frozen < 0 || frozen == 1 || frozen > 1000) return "'frozen_frames' must be 0 (never) or 2 to 1000";
     board.frozen_frames = static_cast<int>(frozen);
-    const auto watchdog_ms = table["watchdog_ms"].value_or(std::int64_t{0});
-    if (watchdog_ms < 0 || watchdog_ms > 3'600'000) return "'watchdog_ms' must be 0 (none) to 3600000";
-    board.watchdog_us = watchdog_ms * 1000;
     board.default_link = table["default_link"].value_or(std::string());
     const toml::table& constant = table;
     std::string fault = read_named(constant["camera"], "camera", board.cameras);

@@ -24,7 +24,6 @@ struct Board {
     std::string name;
     double rate_hz = 60.0;
     int frozen_frames = 3;
-    std::int64_t watchdog_us = 0;
     std::string default_link;  // as --link takes it; "" when there is none
     std::vector<BoardCamera> cameras;
     std::vector<BoardLine> lines;

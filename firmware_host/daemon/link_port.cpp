@@ -117,17 +117,22 @@ void LinkPort::put_frame(MessageType type, ByteSpan payload) {
 }
 
 bool LinkPort::load_next_frame() {
-    if (stage_ == Stage::kNothing || part_ == 0) {
-        // Between frames that belong together nothing else is put.
-        if (!replies_.empty()) {
-            const Reply next = replies_.pop_front();
-            put_frame(next.type, ByteSpan(next.payload).first(next.length));
-            return true;
-        }
+    skip_undue_stages();
+    const bool between_messages = stage_ == Stage::kNothing || part_ == 0;
+    if (between_messages && !replies_.empty()) {
+        const Reply next = replies_.pop_front();
+        put_frame(next.type, ByteSpan(next.payload).first(next.length));
+        return true;
     }
     const bool wanted = (is_waiting_ && waiting_due_.any()) || status_wanted_;
     if (stage_ == Stage::kNothing && wanted) begin_waiting();
     return load_stream_frame();
+}
+
+void LinkPort::skip_undue_stages() {
+    if (stage_ == Stage::kWeights && !sending_due_.weights) stage_ = Stage::kMarkers;
+    if (stage_ == Stage::kMarkers && !sending_due_.markers) stage_ = Stage::kStatus;
+    if (stage_ == Stage::kStatus && !sending_due_.status && !status_wanted_) stage_ = Stage::kNothing;
 }
 
 // The age is taken when the link is ready for the state, not when it was solved.
@@ -150,9 +155,7 @@ void LinkPort::next_part(std::size_t parts, Stage after) {
 bool LinkPort::load_stream_frame() {
     std::array<std::byte, kMaxWirePayloadBytes> payload{};
     Result<std::size_t, WireError> length = std::size_t{0};
-    if (stage_ == Stage::kWeights && !sending_due_.weights) stage_ = Stage::kMarkers;
-    if (stage_ == Stage::kMarkers && !sending_due_.markers) stage_ = Stage::kStatus;
-    if (stage_ == Stage::kStatus && !sending_due_.status && !status_wanted_) stage_ = Stage::kNothing;
+    skip_undue_stages();
     MessageType type = MessageType::kWeights;
     switch (stage_) {
         case Stage::kNothing:
@@ -189,6 +192,7 @@ void LinkPort::finish_frame() {
 
 // The partial frame is lost with the link; what waits stays, and newer states replace it.
 void LinkPort::lose_link() {
+    if (sending_due_.weights) note_replaced();
     is_up_ = false;
     frame_bytes_ = frame_sent_ = 0;
     stage_ = Stage::kNothing;

@@ -85,6 +85,7 @@ class LinkPort {
     [[nodiscard]] bool flush();
     [[nodiscard]] bool load_next_frame();
     [[nodiscard]] bool load_stream_frame();
+    void skip_undue_stages();
     void begin_waiting();
     void put_frame(MessageType type, ByteSpan payload);
     void finish_frame();

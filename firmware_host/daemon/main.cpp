@@ -13,12 +13,13 @@ void print_error(const std::string& message) {
 }
 
 void print_summary(const rig::Wiring& wiring, const rig::Health& health) {
-    fmt::print(stderr,
-               "headrigd: {} ticks, {} solved, {} held, {} sent, {} replaced; solve p50 {:.1f} ms, p99 {:.1f} ms, "
-               "max {:.1f} ms; {} heap calls after seal{}\n",
-               health.ticks, health.solved, health.held, health.frames_sent, health.frames_dropped,
-               health.solve.p50_us * 1e-3, health.solve.p99_us * 1e-3, health.solve.max_us * 1e-3,
-               health.heap_calls_after_seal, rig::heap_guard_is_active() ? "" : " (not watched in this build)");
+    fmt::print(
+        stderr,
+        "headrigd: {} ticks, {} solved, {} held, {} sent, {} replaced; solve p50 {:.1f} ms, p99 {:.1f} ms, "
+        "max {:.1f} ms; {} heap calls after seal{}\n",
+        health.ticks, health.solved, health.held, health.frames_sent, health.frames_dropped,
+        health.solve.p50_us * 1e-3, health.solve.p99_us * 1e-3, health.solve.max_us * 1e-3,
+        health.heap_calls_after_seal, rig::heap_guard_is_active() ? "" : " (not watched in this build)");
     if (wiring.unrecorded_ticks() > 0) {
         print_error(
             fmt::format("{} ticks are missing in the observation log: the disk was too slow or is full",

@@ -8,10 +8,10 @@
 #include "core/pipeline/pipeline.hpp"
 #include "core/wire/health.hpp"
 #include "core/wire/state_messages.hpp"
-#include "firmware_host/daemon/observation_log.hpp"
 #include "firmware_host/daemon/output_gate.hpp"
-#include "firmware_host/daemon/stream_digest.hpp"
 #include "firmware_host/daemon/wear.hpp"
+#include "firmware_host/take_log/observation_log.hpp"
+#include "firmware_host/take_log/stream_digest.hpp"
 #include "hal/clock.hpp"
 
 namespace rig {

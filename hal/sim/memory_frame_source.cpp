@@ -30,8 +30,9 @@ std::int64_t PacedFrameSource::capture_of(std::uint32_t frame) const {
 
 Result<FrameFormat, FrameError> PacedFrameSource::start() {
     stop();
-    started_us_ = clock_.now_us();
-    next_frame_ = 0;
+    if (!ever_started_) started_us_ = clock_.now_us();
+    ever_started_ = true;
+    while (capture_of(next_frame_) <= clock_.now_us()) ++next_frame_;
     running_ = true;
     return format_;
 }

@@ -20,7 +20,8 @@ struct FramePacing {
         true;  // as a sensor does: a consumer behind by more than one frame loses the old ones
 };
 
-// Frame i has its mid-exposure at start + (i + 1) / rate on the clock given.
+// Frame i has its mid-exposure at the first start() + (i + 1) / rate on the clock given; what happens in
+// front of a camera goes on while it is stopped.
 class PacedFrameSource : public FrameSource {
   public:
     PacedFrameSource(Clock& clock, int width_px, int height_px, FramePacing pacing);
@@ -47,6 +48,7 @@ class PacedFrameSource : public FrameSource {
     FramePacing pacing_;
     std::int64_t started_us_ = 0;
     std::uint32_t next_frame_ = 0;
+    bool ever_started_ = false;
     bool running_ = false;
     std::array<bool, kSlots> borrowed_{};
 };

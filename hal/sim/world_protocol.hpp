@@ -1,10 +1,11 @@
-// The boundary between a simulated world and the daemon: a Unix stream socket for messages and one shared memory file
-// for images. Any program that speaks it can stand in for the world; WORLD.md tells it in words.
+// The boundary between a simulated world and the daemon: a Unix stream socket for messages and one shared
+// memory file for images. Any program that speaks it can stand in for the world; WORLD.md tells it in words.
 //
-// The world listens. The daemon connects, and receives one WorldHello whose ancillary data carries the file descriptor
-// of the shared memory. From then on each side sends fixed-size WorldMessage records, little-endian.
-// Image of camera c in ring slot s: at image_offset + (s * camera_count + c) * image_stride_bytes, 8-bit grey, rows of
-// width_px bytes without gaps. The world does not write a slot between its kFrameSet and the daemon's kSlotFree.
+// The world listens. The daemon connects, and receives one WorldHello whose ancillary data carries the file
+// descriptor of the shared memory. From then on each side sends fixed-size WorldMessage records,
+// little-endian. Image of camera c in ring slot s: at image_offset + (s * camera_count + c) *
+// image_stride_bytes, 8-bit grey, rows of width_px bytes without gaps. The world does not write a slot
+// between its kFrameSet and the daemon's kSlotFree.
 #pragma once
 
 #include <array>
@@ -19,9 +20,10 @@ inline constexpr std::uint32_t kWorldMagic = 0x31574752;  // "RGW1"
 inline constexpr std::uint16_t kWorldVersion = 1;
 
 enum class WorldPace : std::uint8_t {
-    kLockstep = 0,  // simulated clock: the daemon's clock is the time of the last message; the world sends the next
-                    // kFrameSet only after kTickDone (it may render ahead, never send ahead)
-    kRealTime = 1,  // times are CLOCK_MONOTONIC; the world sends when a frame is due and drops when no slot is free
+    kLockstep = 0,  // simulated clock: the daemon's clock is the time of the last message; the world sends
+                    // the next kFrameSet only after kTickDone (it may render ahead, never send ahead)
+    kRealTime =
+        1,  // times are CLOCK_MONOTONIC; the world sends when a frame is due and drops when no slot is free
 };
 
 struct WorldHello {
@@ -41,20 +43,28 @@ struct WorldHello {
 
 enum class WorldMessageKind : std::uint8_t {
     // world -> daemon
-    kFrameSet = 1,  // slot, camera_mask, sequence, time_us = mid-exposure; published_us = CLOCK_MONOTONIC when sent
+    kFrameSet =
+        1,  // slot, camera_mask, sequence, time_us = mid-exposure; published_us = CLOCK_MONOTONIC when sent
     kLineEdge = 2,  // line, active, time_us
     kAdvance = 3,   // lockstep only: time goes on to time_us without a frame
     kEnd = 4,       // no more frames
     // daemon -> world
-    kSlotFree = 16,   // slot
-    kTickDone = 17,   // sequence: lockstep's leave to go on
-    kSetLine = 18,    // line, active
-    kExposure = 19,   // camera, value (microseconds)
-    kGain = 20,       // camera, value (decibel)
+    kSlotFree = 16,  // slot
+    kTickDone = 17,  // sequence: lockstep's leave to go on
+    kSetLine = 18,   // line, active
+    kExposure = 19,  // camera, value (microseconds)
+    kGain = 20,      // camera, value (decibel)
 };
 
 // Lines by number; a board file gives them names.
-enum class WorldLine : std::uint8_t { kTrigger = 0, kButtonNeutral = 1, kButtonRecord = 2, kButtonPresence = 3, kLed = 4, kStrobe = 5 };
+enum class WorldLine : std::uint8_t {
+    kTrigger = 0,
+    kButtonNeutral = 1,
+    kButtonRecord = 2,
+    kButtonPresence = 3,
+    kLed = 4,
+    kStrobe = 5
+};
 inline constexpr std::size_t kWorldLineCount = 6;
 
 struct WorldMessage {

@@ -13,10 +13,10 @@ namespace rig::test {
 
 }  // namespace rig::test
 
-// Declares `found` in a test body, or skips the test with the reason. Needs <gtest/gtest.h>.
-#define RIG_SHARED_DATA_OR_SKIP(found, relative)                                                             \
-    const std::filesystem::path found = ::rig::test::shared_data(relative);                                  \
-    if (found.empty()) {                                                                                     \
+// Declares `path` in a test body, or skips the test with the reason. Needs <gtest/gtest.h>.
+#define RIG_SHARED_DATA_OR_SKIP(variable, relative)                                                          \
+    const std::filesystem::path variable = ::rig::test::shared_data(relative);                               \
+    if (variable.empty()) {                                                                                  \
         GTEST_SKIP() << "needs " << (relative) << " of ../shared/data (or set RIG_SHARED_DATA to a folder)"; \
     }                                                                                                        \
     static_cast<void>(0)

@@ -19,7 +19,8 @@ volatile std::sig_atomic_t g_interrupted = 0;
 
 std::int64_t now_ms() {
     using std::chrono::steady_clock;
-    return std::chrono::duration_cast<std::chrono::milliseconds>(steady_clock::now().time_since_epoch()).count();
+    return std::chrono::duration_cast<std::chrono::milliseconds>(steady_clock::now().time_since_epoch())
+        .count();
 }
 
 void on_interrupt(int) {
@@ -36,7 +37,8 @@ void print_error(std::string_view message) {
     fmt::print(stderr, "headrig: {}\n", message);
 }
 
-Progress::Progress(std::string_view what, std::uint64_t total) : what_(what), total_(total), started_ms_(now_ms()) {}
+Progress::Progress(std::string_view what, std::uint64_t total)
+    : what_(what), total_(total), started_ms_(now_ms()) {}
 
 Progress::~Progress() {
     if (drawn_ && is_interactive()) fmt::print(stderr, "\r\x1b[K");
@@ -45,7 +47,8 @@ Progress::~Progress() {
 void Progress::update(std::uint64_t done, std::string_view note) {
     const std::int64_t now = now_ms();
     if (now - started_ms_ < kQuietMs) return;
-    const double fraction = total_ == 0 ? 0.0 : std::min(1.0, static_cast<double>(done) / static_cast<double>(total_));
+    const double fraction =
+        total_ == 0 ? 0.0 : std::min(1.0, static_cast<double>(done) / static_cast<double>(total_));
     if (!is_interactive()) {
         const int tenth = static_cast<int>(fraction * 10.0);
         if (tenth <= tenth_ && drawn_) return;
@@ -58,12 +61,13 @@ void Progress::update(std::uint64_t done, std::string_view note) {
     drawn_ms_ = now;
     drawn_ = true;
     const int filled = static_cast<int>(fraction * 30.0);
-    fmt::print(stderr, "\r\x1b[K{} [{:#<{}}{:.<{}}] {:3.0f} % {}", what_, "", filled, "", 30 - filled, fraction * 100.0, note);
+    fmt::print(stderr, "\r\x1b[K{} [{:#<{}}{:.<{}}] {:3.0f} % {}", what_, "", filled, "", 30 - filled,
+               fraction * 100.0, note);
     std::fflush(stderr);
 }
 
 void install_interrupt_handler() {
-    struct sigaction action {};
+    struct sigaction action{};
     action.sa_handler = on_interrupt;
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);

@@ -131,7 +131,7 @@ int run_detect(const DetectOptions& options) {
 
 void add_detect_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<DetectOptions>();
-    CLI::App* verb = app.add_subcommand("detect", "find the markers in images; CSV on standard output");
+    CLI::App* verb = app.add_subcommand("detect", "Find the markers in images; CSV on standard output");
     verb->add_option("images", options->images, "PGM, PNG or JPEG files")->required()->type_name("IMAGE");
     const std::map<std::string, MarkerPolarity> names = {{"auto", MarkerPolarity::kAuto},
                                                          {"dark", MarkerPolarity::kDark},

@@ -111,7 +111,7 @@ int info_of_link(const InfoOptions& options) {
 
 void add_info_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<InfoOptions>();
-    CLI::App* verb = app.add_subcommand("info", "who is behind a link, or what a recording holds");
+    CLI::App* verb = app.add_subcommand("info", "Who is behind a link, or what a recording holds");
     CLI::Option* link = add_link_option(*verb, options->link);
     CLI::Option* file = verb->add_option("file", options->recording, "a recording of `headrig record --raw`");
     file->type_name("FILE.rec")->excludes(link);

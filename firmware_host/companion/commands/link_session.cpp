@@ -8,7 +8,6 @@
 #include "firmware_host/companion/commands/console.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/links/link_spec.hpp"
-#include "hal/linux/monotonic_clock.hpp"
 
 namespace rig::host {
 
@@ -40,12 +39,18 @@ std::string silence_text(LinkSession& link) {
 }  // namespace
 
 CLI::Option* add_link_option(CLI::App& verb, std::string& link) {
+    const auto well_formed = [](const std::string& text) {
+        const auto spec = parse_link_spec(text);
+        return spec ? std::string() : spec.error().message;
+    };
     return verb.add_option("-l,--link", link, "where the rig is: " + std::string(kLinkSpecHelp))
+        ->check(CLI::Validator(well_formed, ""))
         ->type_name("LINK");
 }
 
 std::int64_t host_now_us() {
-    return MonotonicClock().now_us();
+    static const std::unique_ptr<Clock> clock = host_clock();
+    return clock->now_us();
 }
 
 std::unique_ptr<LinkSession> LinkSession::open(const std::string& link, SessionOptions options,
@@ -62,18 +67,19 @@ std::unique_ptr<LinkSession> LinkSession::open(const std::string& link, SessionO
 }
 
 LinkSession::End LinkSession::run(const std::function<bool()>& done, double timeout_s, Refusal refusal) {
-    MonotonicClock clock;
+    const std::unique_ptr<Clock> clock = host_clock();
     constexpr double kForever_s = 1.0e9;
     const std::int64_t end_us =
-        clock.now_us() + static_cast<std::int64_t>((timeout_s < kForever_s ? timeout_s : kForever_s) * 1.0e6);
+        clock->now_us() +
+        static_cast<std::int64_t>((timeout_s < kForever_s ? timeout_s : kForever_s) * 1.0e6);
     while (true) {
-        const std::int64_t now_us = clock.now_us();
+        const std::int64_t now_us = clock->now_us();
         session_.poll(now_us);
         if (done()) return End::kDone;
         if (interrupted()) return End::kInterrupted;
         if (refusal == Refusal::kEnds && session_.phase() == SessionPhase::kRefused) return End::kRefused;
         if (now_us >= end_us) return End::kTimeout;
-        clock.sleep_until_us(now_us + kPollEvery_us);
+        clock->sleep_until_us(now_us + kPollEvery_us);
     }
 }
 

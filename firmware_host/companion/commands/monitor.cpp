@@ -100,14 +100,16 @@ int run_monitor(const MonitorOptions& options) {
     }
     session.leave();
     if (gathered.states > 0) return kExitOk;
-    return interrupted() ? kExitInterrupted : report_end(LinkSession::End::kTimeout, *link);
+    if (interrupted()) return kExitInterrupted;
+    const bool refused = session.phase() == SessionPhase::kRefused;
+    return report_end(refused ? LinkSession::End::kRefused : LinkSession::End::kTimeout, *link);
 }
 
 }  // namespace
 
 void add_monitor_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<MonitorOptions>();
-    CLI::App* verb = app.add_subcommand("monitor", "live bars of weights and health in the terminal");
+    CLI::App* verb = app.add_subcommand("monitor", "Live bars of weights and health in the terminal");
     add_link_option(*verb, options->link)->required();
     verb->add_option("--seconds", options->seconds, "end after this time; default: Ctrl-C")
         ->check(CLI::Range(0.1, kForever_s))

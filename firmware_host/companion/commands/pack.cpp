@@ -207,10 +207,10 @@ int run_pack_info(const PackInfoCommand& command) {
 }  // namespace
 
 void add_pack_verb(CLI::App& app, int& exit_code) {
-    CLI::App* pack = app.add_subcommand("pack", "look into solve packs");
+    CLI::App* pack = app.add_subcommand("pack", "Look into solve packs");
     pack->require_subcommand(1);
     auto command = std::make_shared<PackInfoCommand>();
-    CLI::App* info = pack->add_subcommand("info", "verify a pack and print everything readable in it");
+    CLI::App* info = pack->add_subcommand("info", "Verify a pack and print everything readable in it");
     info->add_option("file", command->file, "pack file")->required()->type_name("PACK");
     info->add_flag("--json", command->json, "as one JSON object");
     info->footer(

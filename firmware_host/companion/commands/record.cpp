@@ -61,7 +61,8 @@ void take_state(Taking& taking, const ReceivedState& received) {
         return;
     }
     taking.sequences.push_back(received.state.sequence);
-    if (received.latency_us) taking.latencies_us.push_back(*received.latency_us);
+    // A held state's capture is old by design; its age says so.
+    if (received.latency_us && !received.state.held) taking.latencies_us.push_back(*received.latency_us);
 }
 
 void take_markers(Taking& taking, const MarkerFrame& frame) {
@@ -223,7 +224,7 @@ int run_record(const RecordOptions& options) {
 
 void add_record_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<RecordOptions>();
-    CLI::App* verb = app.add_subcommand("record", "write what a rig streams into files");
+    CLI::App* verb = app.add_subcommand("record", "Write what a rig streams into files");
     add_link_option(*verb, options->link)->required();
     verb->add_option("-o,--out", options->out, "weights: frame,time_s,<shape names>")
         ->required()

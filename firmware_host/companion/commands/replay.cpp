@@ -64,18 +64,23 @@ int run_replay(const ReplayOptions& options) {
 
 void add_replay_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<ReplayOptions>();
-    CLI::App* verb = app.add_subcommand("replay", "solve a take again from the observations recorded on the rig");
-    verb->add_option("log", options->log, "observation log of `headrigd --log-observations`")->required()->type_name("FILE.rgo");
+    CLI::App* verb =
+        app.add_subcommand("replay", "Solve a take again from the observations recorded on the rig");
+    verb->add_option("log", options->log, "observation log of `headrigd --log-observations`")
+        ->required()
+        ->type_name("FILE.rgo");
     verb->add_option("--pack", options->pack, "the pack it was recorded with")->required()->type_name("FILE");
     verb->add_option("--out", options->weights_csv, "weights: frame,time_s,<shapes>")->type_name("W.csv");
     verb->add_flag("--another-pack", options->another_pack, "solve with a pack other than the recorded one");
     verb->footer(
-        "The digest is the one that `headrigd --digest` printed for the take: the same pack and the same observations\n"
+        "The digest is the one that `headrigd --digest` printed for the take: the same pack and the same "
+        "observations\n"
         "give the same bytes on every machine and with every build.\n"
         "Examples:\n"
         "  headrig replay take.rgo --pack face.pack --out weights.csv\n"
         "  headrig replay take.rgo --pack retrained.pack --another-pack --out weights.csv\n"
-        "Exit codes: 0 done, 2 wrong command line, 3 an input is missing, malformed or cut, 4 an output could not be\n"
+        "Exit codes: 0 done, 2 wrong command line, 3 an input is missing, malformed or cut, 4 an output "
+        "could not be\n"
         "written, 130 interrupted.");
     verb->callback([options, &exit_code] { exit_code = run_replay(*options); });
 }

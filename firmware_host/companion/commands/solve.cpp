@@ -42,8 +42,9 @@ struct SolveResults {
 
 const std::vector<std::string>& report_columns() {
     static const std::vector<std::string> columns{
-        "frame",       "state",       "kkt",         "objective",   "iterations",  "markers_used", "residual_rms_mm",
-        "slip_rx_rad", "slip_ry_rad", "slip_rz_rad", "slip_tx_mm",  "slip_ty_mm",  "slip_tz_mm"};
+        "frame",        "state",           "kkt",         "objective",   "iterations",
+        "markers_used", "residual_rms_mm", "slip_rx_rad", "slip_ry_rad", "slip_rz_rad",
+        "slip_tx_mm",   "slip_ty_mm",      "slip_tz_mm"};
     return columns;
 }
 
@@ -55,18 +56,25 @@ std::vector<std::string> weight_columns(const SolvePack& pack) {
 
 const char* state_name(TrackingState state) {
     switch (state) {
-        case TrackingState::kSafe: return "SAFE";
-        case TrackingState::kLost: return "LOST";
-        case TrackingState::kHold: return "HOLD";
-        case TrackingState::kPartial: return "PARTIAL";
-        case TrackingState::kLive: return "LIVE";
+        case TrackingState::kSafe:
+            return "SAFE";
+        case TrackingState::kLost:
+            return "LOST";
+        case TrackingState::kHold:
+            return "HOLD";
+        case TrackingState::kPartial:
+            return "PARTIAL";
+        case TrackingState::kLive:
+            return "LIVE";
     }
     return "?";
 }
 
-Result<void, FileError> check_stream(const SolveOptions& options, const SolvePack& pack, const NpyArray<float>& stream) {
+Result<void, FileError> check_stream(const SolveOptions& options, const SolvePack& pack,
+                                     const NpyArray<float>& stream) {
     if (stream.shape.size() != 3 || stream.shape[2] != 3) {
-        return failure(FileError{options.markers + ": not a marker stream; expected an array (frames, markers, 3)"});
+        return failure(
+            FileError{options.markers + ": not a marker stream; expected an array (frames, markers, 3)"});
     }
     if (options.unlabelled) {
         if (stream.shape[1] >= 1 && stream.shape[1] <= kMaxPoints) return {};
@@ -74,10 +82,11 @@ Result<void, FileError> check_stream(const SolveOptions& options, const SolvePac
                                              stream.shape[1], kMaxPoints)});
     }
     if (stream.shape[1] == pack.marker_count) return {};
-    return failure(FileError{fmt::format(
-        "{}: {} markers a frame, but {} was trained for {}; train a pack for this layout, or say --unlabelled if "
-        "the rows are shuffled",
-        options.markers, stream.shape[1], options.pack, pack.marker_count)});
+    return failure(
+        FileError{fmt::format("{}: {} markers a frame, but {} was trained for {}; train a pack for this "
+                              "layout, or say --unlabelled if "
+                              "the rows are shuffled",
+                              options.markers, stream.shape[1], options.pack, pack.marker_count)});
 }
 
 void add_report_row(std::size_t frame, const FaceState& state, const FrameReport& report, CsvWriter& csv) {
@@ -89,19 +98,22 @@ void add_report_row(std::size_t frame, const FaceState& state, const FrameReport
     csv.end_row();
 }
 
-void add_results(const SolveOptions& options, const SolvePack& pack, std::size_t frame, const FaceState& state,
-                 const FrameReport& report, std::size_t slots, SolveResults& results) {
+void add_results(const SolveOptions& options, const SolvePack& pack, std::size_t frame,
+                 const FaceState& state, const FrameReport& report, std::size_t slots,
+                 SolveResults& results) {
     results.weights.integer(static_cast<std::int64_t>(frame));
     results.weights.number(static_cast<double>(frame) / options.rate_hz, 6);
-    for (std::size_t i = 0; i < pack.shape_count; ++i) results.weights.number(static_cast<double>(state.weights[i]), 6);
+    for (std::size_t i = 0; i < pack.shape_count; ++i)
+        results.weights.number(static_cast<double>(state.weights[i]), 6);
     results.weights.end_row();
     add_report_row(frame, state, report, results.report);
     for (std::size_t s = 0; s < slots; ++s) results.labels.values.push_back(report.labels[s]);
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         for (Eigen::Index axis = 0; axis < 3; ++axis) {
             // A frame without a solve has no completed markers: NaN, as in the input, never a position.
-            results.points.values.push_back(report.solved ? static_cast<float>(report.face_markers_mm[k][axis])
-                                                          : std::numeric_limits<float>::quiet_NaN());
+            results.points.values.push_back(report.solved
+                                                ? static_cast<float>(report.face_markers_mm[k][axis])
+                                                : std::numeric_limits<float>::quiet_NaN());
         }
     }
 }
@@ -111,17 +123,19 @@ void label_own_rows(const Pipeline& pipeline, std::span<const Vec3> positions, F
     std::size_t sighting = 0;
     for (std::size_t slot = 0; slot < positions.size(); ++slot) {
         const Vec3& p = positions[slot];
-        if (!is_finite(p[0]) || !is_finite(p[1]) || !is_finite(p[2]) || p.cwiseAbs().maxCoeff() > 1000.0) continue;
+        if (!is_finite(p[0]) || !is_finite(p[1]) || !is_finite(p[2]) || p.cwiseAbs().maxCoeff() > 1000.0)
+            continue;
         const auto& taken = pipeline.matches()[0];
         for (std::size_t k = 0; k < positions.size(); ++k) {
-            if (taken[k] == static_cast<std::int16_t>(sighting)) report.labels[slot] = static_cast<std::int16_t>(k);
+            if (taken[k] == static_cast<std::int16_t>(sighting))
+                report.labels[slot] = static_cast<std::int16_t>(k);
         }
         ++sighting;
     }
 }
 
-int solve_frames(const SolveOptions& options, const SolvePack& pack, const NpyArray<float>& stream, Pipeline& pipeline,
-                 SolveResults& results) {
+int solve_frames(const SolveOptions& options, const SolvePack& pack, const NpyArray<float>& stream,
+                 Pipeline& pipeline, SolveResults& results) {
     const std::size_t frames = stream.shape[0];
     const std::size_t slots = stream.shape[1];
     std::vector<Vec3> positions(slots);
@@ -132,9 +146,11 @@ int solve_frames(const SolveOptions& options, const SolvePack& pack, const NpyAr
         if (interrupted()) return kExitInterrupted;
         for (std::size_t s = 0; s < slots; ++s) {
             const float* at = stream.values.data() + (frame * slots + s) * 3;
-            positions[s] = Vec3{static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
+            positions[s] =
+                Vec3{static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
         }
-        const auto capture_us = static_cast<std::int64_t>(std::llround(static_cast<double>(frame) * 1e6 / options.rate_hz));
+        const auto capture_us =
+            static_cast<std::int64_t>(std::llround(static_cast<double>(frame) * 1e6 / options.rate_hz));
         if (options.unlabelled) {
             pipeline.step(PointFrame{capture_us, positions}, *state, *report);
         } else {
@@ -210,23 +226,32 @@ void add_solve_verb(CLI::App& app, int& exit_code) {
                      "Stream (frames, markers, 3), float32 .npy, millimetres, NaN = missing")
         ->required()
         ->type_name("M.npy");
-    verb->add_option("--out", options->weights_csv, "Weights: frame,time_s,<shapes> (default: standard output)")
+    verb->add_option("--out", options->weights_csv,
+                     "Weights: frame,time_s,<shapes> (default: standard output)")
         ->type_name("W.csv");
-    verb->add_option("--report", options->report_csv, "Certificate and slip of every frame")->type_name("R.csv");
-    verb->add_option("--labels", options->labels_npy, "(frames, slots) int32: the marker of each slot, -1 = ghost")
+    verb->add_option("--report", options->report_csv, "Certificate and slip of every frame")
+        ->type_name("R.csv");
+    verb->add_option("--labels", options->labels_npy,
+                     "(frames, slots) int32: the marker of each slot, -1 = ghost")
         ->type_name("L.npy");
-    verb->add_option("--points", options->points_npy, "(frames, markers, 3) float32: completed, stabilised markers, mm")
+    verb->add_option("--points", options->points_npy,
+                     "(frames, markers, 3) float32: completed, stabilised markers, mm")
         ->type_name("P.npy");
     verb->add_flag("--unlabelled", options->unlabelled, "Rows come in any order, ghosts among them");
-    verb->add_option("--rate", options->rate_hz, "Frames per second")->capture_default_str()->check(CLI::Range(1.0, 1000.0));
-    verb->add_flag("--no-filter", options->no_filter, "No smoothing, no recovery blends (a pack's temporal prior stays)");
+    verb->add_option("--rate", options->rate_hz, "Frames per second")
+        ->capture_default_str()
+        ->check(CLI::Range(1.0, 1000.0));
+    verb->add_flag("--no-filter", options->no_filter,
+                   "No smoothing, no recovery blends (a pack's temporal prior stays)");
     verb->add_flag("--no-stabilise", options->no_stabilise, "The stream is in the face frame already");
     verb->footer(
         "Examples:\n"
         "  headrig train --rig head/ --layout 60 --solver boxqp --out face.pack\n"
         "  headrig solve --pack face.pack --markers take.npy --out weights.csv --report report.csv\n"
-        "  headrig solve --pack face.pack --markers cloud.npy --unlabelled --labels names.npy --out weights.csv\n"
-        "Exit codes: 0 done, 2 wrong command line, 3 an input is missing or malformed, 4 an output could not be\n"
+        "  headrig solve --pack face.pack --markers cloud.npy --unlabelled --labels names.npy --out "
+        "weights.csv\n"
+        "Exit codes: 0 done, 2 wrong command line, 3 an input is missing or malformed, 4 an output could not "
+        "be\n"
         "written, 130 interrupted.");
     verb->callback([options, &exit_code] { exit_code = run_solve(*options); });
 }

@@ -52,7 +52,7 @@ int run_status(const StatusOptions& options) {
 
 void add_status_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<StatusOptions>();
-    CLI::App* verb = app.add_subcommand("status", "one look at a rig's health, faults in plain words");
+    CLI::App* verb = app.add_subcommand("status", "One look at a rig's health, faults in plain words");
     add_link_option(*verb, options->link);
     verb->add_flag("--check", options->check,
                    "exit code 1 when a fault is present or the face is not tracked");

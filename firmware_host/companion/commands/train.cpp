@@ -144,7 +144,7 @@ int run_train(TrainCommand& command) {
 
 void add_train_verb(CLI::App& app, int& exit_code) {
     auto command = std::make_shared<TrainCommand>();
-    CLI::App* verb = app.add_subcommand("train", "make a solve pack from a rig folder");
+    CLI::App* verb = app.add_subcommand("train", "Make a solve pack from a rig folder");
     verb->add_option("--rig", command->rig, "rig folder")->required()->type_name("DIR");
     verb->add_option("--layout", command->layout, "number of a layout of the folder, or a layout file")
         ->capture_default_str()

@@ -14,8 +14,8 @@ inline constexpr int kExitOutput = 4;  // a result could not be written
 inline constexpr int kExitDevice = 5;  // the rig, link or world is not there or went away
 inline constexpr int kExitInterrupted = 130;
 
-// Each adds its subcommand to `app` and stores its exit code in `exit_code` when it is run. One a line, in alphabetical
-// order.
+// Each adds its subcommand to `app` and stores its exit code in `exit_code` when it is run. One a line, in
+// alphabetical order.
 void add_demo_verb(CLI::App& app, int& exit_code);
 void add_detect_verb(CLI::App& app, int& exit_code);
 void add_import_verb(CLI::App& app, int& exit_code);

@@ -311,7 +311,7 @@ void add_output_options(CLI::App& verb, WorldOptions& options) {
 void add_world_verb(CLI::App& app, int& exit_code) {
     auto options = std::make_shared<WorldOptions>();
     CLI::App* verb =
-        app.add_subcommand("world", "render what the helmet's cameras see: files, or live for the daemon");
+        app.add_subcommand("world", "Render what the helmet's cameras see: files, or live for the daemon");
     add_scene_options(*verb, *options);
     add_output_options(*verb, *options);
     verb->footer(

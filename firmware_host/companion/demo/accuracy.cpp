@@ -8,7 +8,8 @@ namespace rig::host {
 
 namespace {
 
-// Two markers of pressed lips come this close; only a marker farther than this from its own place can be on another's.
+// Two markers of pressed lips come this close; only a marker farther than this from its own place can be on
+// another's.
 constexpr double kOwnPlaceMm = 2.0;
 
 double squared_distance_mm2(const Vec3d& truth, const std::array<float, 3>& measured) {
@@ -91,7 +92,8 @@ AccuracyFigures Accuracy::figures() const {
         ++figures.observable_shapes;
         sum += mean;
     }
-    if (figures.observable_shapes > 0) figures.weight_rms = std::sqrt(sum / static_cast<double>(figures.observable_shapes));
+    if (figures.observable_shapes > 0)
+        figures.weight_rms = std::sqrt(sum / static_cast<double>(figures.observable_shapes));
     if (markers_ > 0) figures.marker_rms_mm = std::sqrt(marker_squares_mm2_ / static_cast<double>(markers_));
     return figures;
 }

@@ -10,17 +10,18 @@
 
 namespace rig::host {
 
-// Shapes whose marker column is longer than this (mm per unit weight, all markers together) are judged; the others
-// hardly move a marker, so that their weights say more about priors than about the solver.
+// Shapes whose marker column is longer than this (mm per unit weight, all markers together) are judged; the
+// others hardly move a marker, so that their weights say more about priors than about the solver.
 inline constexpr double kObservableColumnMm = 1.0;
 
 struct AccuracyFigures {
-    std::uint64_t frames_judged = 0;    // with a solve behind them
-    std::uint64_t frames_held = 0;      // without
+    std::uint64_t frames_judged = 0;  // with a solve behind them
+    std::uint64_t frames_held = 0;    // without
     std::uint64_t observable_shapes = 0;
-    double weight_rms = 0.0;            // over observable shapes and judged frames
+    double weight_rms = 0.0;  // over observable shapes and judged frames
     double worst_frame_weight_rms = 0.0;
-    double marker_rms_mm = 0.0;         // 3D distance, markers seen by two cameras or more; by one when the rig has one
+    double marker_rms_mm =
+        0.0;  // 3D distance, markers seen by two cameras or more; by one when the rig has one
     std::uint64_t markers_judged = 0;
     std::uint64_t identity_errors = 0;  // markers that lie on another marker's true place
     std::vector<double> shape_rms;      // per shape, judged frames
@@ -36,7 +37,8 @@ class Accuracy {
     [[nodiscard]] bool observable(std::size_t shape) const { return column_mm_[shape] > kObservableColumnMm; }
 
   private:
-    [[nodiscard]] bool names_another(const FrameTruth& truth, std::size_t marker, const MarkerSample& sample) const;
+    [[nodiscard]] bool names_another(const FrameTruth& truth, std::size_t marker,
+                                     const MarkerSample& sample) const;
 
     const World& world_;
     std::vector<double> column_mm_;

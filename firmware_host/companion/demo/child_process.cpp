@@ -30,7 +30,8 @@ Result<ChildProcess, FileError> ChildProcess::start(const std::vector<std::strin
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
+                                     0644);
     posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
     pid_t id = -1;
     const int fault = posix_spawn(&id, raw[0], &actions, nullptr, raw.data(), environ);
@@ -66,7 +67,7 @@ void ChildProcess::terminate() const {
 std::optional<ChildEnd> ChildProcess::poll() {
     if (end_ || id_ < 0) return end_;
     int status = 0;
-    struct rusage usage {};
+    struct rusage usage{};
     if (wait4(id_, &status, WNOHANG, &usage) != id_) return std::nullopt;
     ChildEnd end;
     end.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

@@ -15,7 +15,7 @@
 namespace rig::host {
 
 struct ChildEnd {
-    int exit_code = 0;          // 128 + signal when a signal ended it
+    int exit_code = 0;  // 128 + signal when a signal ended it
     std::int64_t peak_memory_kb = 0;
 };
 

@@ -17,19 +17,19 @@
 #include "firmware_host/companion/files/csv.hpp"
 #include "firmware_host/companion/links/host_session.hpp"
 #include "firmware_host/companion/links/link_spec.hpp"
+#include "firmware_host/companion/replay/replay_log.hpp"
 #include "firmware_host/companion/train/camera_file.hpp"
 #include "firmware_host/companion/train/pack_writer.hpp"
-#include "firmware_host/companion/replay/replay_log.hpp"
-#include "firmware_host/daemon/stream_digest.hpp"
 #include "firmware_host/pack_file/opened_pack.hpp"
+#include "firmware_host/take_log/stream_digest.hpp"
 
 namespace rig::host {
 
 namespace {
 
-constexpr std::int64_t kLinkTimeoutUs = 10'000'000;   // for the daemon to make its serial line
-constexpr std::int64_t kDrainUs = 2'000'000;          // for the last frames after the daemon has ended
-constexpr std::int64_t kStallUs = 30'000'000;         // without any frame: something hangs
+constexpr std::int64_t kLinkTimeoutUs = 10'000'000;  // for the daemon to make its serial line
+constexpr std::int64_t kDrainUs = 2'000'000;         // for the last frames after the daemon has ended
+constexpr std::int64_t kStallUs = 30'000'000;        // without any frame: something hangs
 constexpr std::size_t kCurves = 12;
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 
@@ -90,9 +90,11 @@ Result<Stage, FileError> load_stage(const DemoOptions& options) {
     config.seed = options.seed;
     config.start_frame = options.start_frame;
     config.frame_count = static_cast<std::size_t>(std::llround(options.seconds * config.rate_hz));
-    const double left = static_cast<double>(stage.take.frame_count) - static_cast<double>(options.start_frame);
+    const double left =
+        static_cast<double>(stage.take.frame_count) - static_cast<double>(options.start_frame);
     const double left_at_rate = left * config.rate_hz / stage.take.rate_hz;
-    if (static_cast<double>(config.frame_count) > left_at_rate) config.frame_count = 0;  // to the end of the take
+    if (static_cast<double>(config.frame_count) > left_at_rate)
+        config.frame_count = 0;  // to the end of the take
     auto world = World::create(stage.rig, stage.layout, stage.take, config);
     if (!world) return failure(world.error());
     stage.world = std::move(*world);
@@ -102,7 +104,8 @@ Result<Stage, FileError> load_stage(const DemoOptions& options) {
 // The daemon gets the pack as a person would make it: through the files.
 Result<OpenedPack, FileError> make_pack(const DemoOptions& options, const Stage& stage) {
     const auto cameras_json = options.out_folder / "cameras.json";
-    const auto saved = save_helmet(cameras_json, stage.world->cameras(), stage.world->config().dot_radius_mm, options.layout);
+    const auto saved = save_helmet(cameras_json, stage.world->cameras(), stage.world->config().dot_radius_mm,
+                                   options.layout);
     if (!saved) return failure(saved.error());
     TrainOptions training;
     training.solver = options.solver;
@@ -115,7 +118,8 @@ Result<OpenedPack, FileError> make_pack(const DemoOptions& options, const Stage&
     PackIdentity identity;
     identity.name = "demo";
     const auto path = options.out_folder / "face.pack";
-    if (const auto written = save_pack(path, trained->view(), identity); !written) return failure(written.error());
+    if (const auto written = save_pack(path, trained->view(), identity); !written)
+        return failure(written.error());
     auto opened = open_pack_file(path);
     if (!opened) return failure(FileError{opened.error().message});
     return std::move(*opened);
@@ -124,16 +128,16 @@ Result<OpenedPack, FileError> make_pack(const DemoOptions& options, const Stage&
 // What arrives at the host, frame by frame of the world.
 class Reception {
   public:
-    Reception(const Stage& stage, const HandOver& hand_over, bool real_time)
+    Reception(const Stage& stage, const HandOver& hand_over, const ServerCounters& served, bool real_time)
         : accuracy(*stage.world, stage.model),
           world_(*stage.world),
           hand_over_(hand_over),
+          served_(served),
           real_time_(real_time),
           states_(stage.world->frame_count()),
           have_(stage.world->frame_count(), false) {}
 
     void take_state(const ReceivedState& received) {
-        if (!first_us_) first_us_ = received.state.capture_us;
         const auto frame = frame_of(received.state.sequence, received.state.capture_us);
         if (!frame || have_[*frame]) return;
         have_[*frame] = true;
@@ -179,11 +183,12 @@ class Reception {
     Accuracy accuracy;
 
   private:
-    // In lockstep a tick is a frame set. In real time a held tick has no frame of its own; the capture time tells.
+    // In lockstep a tick is a frame set. In real time a held tick has no frame of its own; the capture time
+    // tells.
     std::optional<std::size_t> frame_of(std::uint32_t sequence, std::int64_t capture_us) const {
         std::size_t frame = sequence;
         if (real_time_) {
-            const double since_s = static_cast<double>(capture_us - first_us_.value_or(capture_us)) * 1e-6;
+            const double since_s = static_cast<double>(capture_us - served_.start_us) * 1e-6;
             frame = static_cast<std::size_t>(std::llround(std::max(0.0, since_s) * world_.config().rate_hz));
         }
         if (frame >= world_.frame_count()) return std::nullopt;
@@ -192,26 +197,33 @@ class Reception {
 
     const World& world_;
     const HandOver& hand_over_;
+    const ServerCounters& served_;
     bool real_time_;
     std::vector<FaceState> states_;
     std::vector<bool> have_;
     std::vector<double> latencies_ms_;
     std::uint64_t received_ = 0;
     std::int64_t last_received_us_ = 0;
-    std::optional<std::int64_t> first_us_;
 };
 
 Result<ChildProcess, FileError> start_daemon(const DemoOptions& options, const std::filesystem::path& socket,
                                              const std::filesystem::path& line) {
     const std::vector<std::string> arguments{options.daemon.string(),
-                                             "--board", "sim",
-                                             "--world", socket.string(),
-                                             "--pack", (options.out_folder / "face.pack").string(),
-                                             "--link", "pty:" + line.string(),
-                                             "--stream", "weights,markers,status",
-                                             "--log-observations", (options.out_folder / "take.rgo").string(),
+                                             "--board",
+                                             "sim",
+                                             "--world",
+                                             socket.string(),
+                                             "--pack",
+                                             (options.out_folder / "face.pack").string(),
+                                             "--link",
+                                             "pty:" + line.string(),
+                                             "--stream",
+                                             "weights,markers,status",
+                                             "--log-observations",
+                                             (options.out_folder / "take.rgo").string(),
                                              "--digest",
-                                             "--executor", options.real_time ? "threads" : "lockstep"};
+                                             "--executor",
+                                             options.real_time ? "threads" : "lockstep"};
     return ChildProcess::start(arguments, options.out_folder / "headrigd.log");
 }
 
@@ -220,12 +232,14 @@ FileError daemon_fault(const DemoOptions& options, const std::string& what) {
                                  (options.out_folder / "headrigd.log").string())};
 }
 
-Result<std::unique_ptr<ByteLink>, FileError> open_line(const DemoOptions& options, const std::filesystem::path& line,
+Result<std::unique_ptr<ByteLink>, FileError> open_line(const DemoOptions& options,
+                                                       const std::filesystem::path& line,
                                                        ChildProcess& daemon) {
     const std::int64_t until = monotonic_us() + kLinkTimeoutUs;
     while (monotonic_us() < until) {
         if (const auto end = daemon.poll()) {
-            return failure(daemon_fault(options, fmt::format("ended with code {} before it started", end->exit_code)));
+            return failure(
+                daemon_fault(options, fmt::format("ended with code {} before it started", end->exit_code)));
         }
         std::error_code ignored;
         if (std::filesystem::exists(line, ignored)) {
@@ -257,8 +271,9 @@ Result<bool, FileError> receive_all(const DemoOptions& options, const DemoEvents
         if (ended_us == 0) {
             if (daemon.poll()) ended_us = now;
             if (now - alive_us > kStallUs) {
-                return failure(daemon_fault(options, fmt::format("nothing received for 30 s after {} of {} frames",
-                                                                 seen, hand_over.handed())));
+                return failure(
+                    daemon_fault(options, fmt::format("nothing received for 30 s after {} of {} frames", seen,
+                                                      hand_over.handed())));
             }
         } else if (seen >= total || now - ended_us > kDrainUs || session.phase() == SessionPhase::kClosed) {
             return true;
@@ -267,13 +282,15 @@ Result<bool, FileError> receive_all(const DemoOptions& options, const DemoEvents
     }
 }
 
-Result<void, FileError> save_weights(const std::filesystem::path& path, const Stage& stage, const Reception& reception) {
+Result<void, FileError> save_weights(const std::filesystem::path& path, const Stage& stage,
+                                     const Reception& reception) {
     std::vector<std::string> columns{"frame", "time_s"};
     for (const SparseShape& shape : stage.rig.shapes) columns.push_back(shape.name);
     CsvWriter csv(columns);
     for (std::size_t f = 0; f < stage.world->frame_count(); ++f) {
         if (!reception.has(f)) continue;
-        csv.integer(static_cast<std::int64_t>(f)).number(static_cast<double>(f) / stage.world->config().rate_hz, 6);
+        csv.integer(static_cast<std::int64_t>(f))
+            .number(static_cast<double>(f) / stage.world->config().rate_hz, 6);
         for (std::size_t i = 0; i < stage.rig.shapes.size(); ++i) {
             csv.number(static_cast<double>(reception.states()[f].weights[i]), 6);
         }
@@ -283,7 +300,8 @@ Result<void, FileError> save_weights(const std::filesystem::path& path, const St
 }
 
 // The observable shapes that move most in the truth.
-std::vector<Curve> pick_curves(const Stage& stage, const Reception& reception, const AccuracyFigures& accuracy) {
+std::vector<Curve> pick_curves(const Stage& stage, const Reception& reception,
+                               const AccuracyFigures& accuracy) {
     const std::size_t shapes = stage.rig.shapes.size();
     const std::size_t frames = stage.world->frame_count();
     std::vector<std::vector<double>> truth(shapes, std::vector<double>(frames));
@@ -293,17 +311,20 @@ std::vector<Curve> pick_curves(const Stage& stage, const Reception& reception, c
         for (std::size_t i = 0; i < shapes; ++i) truth[i][f] = static_cast<double>(weights[i]);
     }
     for (std::size_t i = 0; i < shapes; ++i) {
-        const double mean = std::accumulate(truth[i].begin(), truth[i].end(), 0.0) / static_cast<double>(frames);
+        const double mean =
+            std::accumulate(truth[i].begin(), truth[i].end(), 0.0) / static_cast<double>(frames);
         for (const double w : truth[i]) spread[i] += (w - mean) * (w - mean);
         if (!reception.accuracy.observable(i)) spread[i] = -1.0;
     }
     std::vector<std::size_t> order(shapes);
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return spread[a] > spread[b]; });
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return spread[a] > spread[b]; });
     order.resize(std::min(order.size(), kCurves));
     std::vector<Curve> curves;
     for (const std::size_t i : order) {
-        Curve curve{stage.rig.shapes[i].name, truth[i], std::vector<double>(frames, kNothing), accuracy.shape_rms[i]};
+        Curve curve{stage.rig.shapes[i].name, truth[i], std::vector<double>(frames, kNothing),
+                    accuracy.shape_rms[i]};
         for (std::size_t f = 0; f < frames; ++f) {
             if (reception.has(f) && !reception.states()[f].held) {
                 curve.solved[f] = static_cast<double>(reception.states()[f].weights[i]);
@@ -319,10 +340,13 @@ Result<void, FileError> write_outputs(const DemoOptions& options, const Stage& s
     const auto& out = options.out_folder;
     if (const auto saved = save_weights(out / "weights.csv", stage, reception); !saved) return saved;
     const auto curves = pick_curves(stage, reception, figures.accuracy);
-    const std::string title = fmt::format("{} of {}: weight rms {:.4f} over {} observable shapes",
-                                          options.take_csv.filename().string(), options.rig_folder.filename().string(),
-                                          figures.accuracy.weight_rms, figures.accuracy.observable_shapes);
-    if (const auto drawn = draw_curves(out / "curves.png", curves, stage.world->config().rate_hz, title); !drawn) return drawn;
+    const std::string title =
+        fmt::format("{} of {}: weight rms {:.4f} over {} observable shapes",
+                    options.take_csv.filename().string(), options.rig_folder.filename().string(),
+                    figures.accuracy.weight_rms, figures.accuracy.observable_shapes);
+    if (const auto drawn = draw_curves(out / "curves.png", curves, stage.world->config().rate_hz, title);
+        !drawn)
+        return drawn;
     return draw_overlay(out / "overlay.png", *stage.world, pack, stage.world->frame_count() / 2);
 }
 
@@ -340,15 +364,17 @@ struct ScratchFolder {
     }
 };
 
-void fill_figures(const Stage& stage, const WorldServer& server, const HostSession& session, const Health& health,
-                  const std::optional<ChildEnd>& end, Reception& reception, DemoFigures& figures) {
+void fill_figures(const Stage& stage, const WorldServer& server, const HostSession& session,
+                  const Health& health, const std::optional<ChildEnd>& end, Reception& reception,
+                  DemoFigures& figures) {
     figures.frames = stage.world->frame_count();
     figures.rendered = server.counters().rendered;
     figures.not_sent = server.counters().dropped;
     figures.solved = health.solved;
     figures.sent = health.frames_sent;
     figures.received = reception.received();
-    figures.lost = figures.frames - figures.not_sent - std::min(figures.received, figures.frames - figures.not_sent);
+    figures.lost =
+        figures.frames - figures.not_sent - std::min(figures.received, figures.frames - figures.not_sent);
     const FrameCounters& wire = session.frames();
     figures.bad_wire = wire.bad_crc + wire.bad_cobs + wire.too_long + wire.bad_length + wire.bad_version;
     figures.latency = reception.latency();
@@ -360,6 +386,15 @@ void fill_figures(const Stage& stage, const WorldServer& server, const HostSessi
     figures.solve_max_ms = health.solve.max_us * 1e-3;
 }
 
+// Of the observations that the daemon recorded, solved again here.
+Result<std::uint64_t, FileError> replay_digest(const DemoOptions& options, const OpenedPack& pack) {
+    const ReplayRequest request{options.out_folder / "take.rgo", (options.out_folder / "face.pack").string(),
+                                false};
+    const auto replayed = replay_log(request, pack, [](const FaceState&, double) { return true; });
+    if (!replayed) return failure(replayed.error());
+    return replayed->digest;
+}
+
 }  // namespace
 
 std::vector<std::string> broken_bounds(const DemoFigures& figures, const DemoBounds& bounds, bool real_time) {
@@ -368,18 +403,22 @@ std::vector<std::string> broken_bounds(const DemoFigures& figures, const DemoBou
         if (!holds) broken.push_back(std::move(line));
     };
     const AccuracyFigures& a = figures.accuracy;
-    check(a.weight_rms <= bounds.weight_rms, fmt::format("weight rms {:.4f} > {:.4f}", a.weight_rms, bounds.weight_rms));
+    check(a.weight_rms <= bounds.weight_rms,
+          fmt::format("weight rms {:.4f} > {:.4f}", a.weight_rms, bounds.weight_rms));
     check(a.marker_rms_mm <= bounds.marker_rms_mm,
           fmt::format("marker rms {:.3f} mm > {:.3f} mm", a.marker_rms_mm, bounds.marker_rms_mm));
     check(a.markers_judged > 0, "no marker was received");
     check(a.identity_errors == 0, fmt::format("{} identity errors", a.identity_errors));
-    check(figures.heap_calls_after_seal == 0, fmt::format("{} heap calls after seal", figures.heap_calls_after_seal));
+    check(figures.heap_calls_after_seal == 0,
+          fmt::format("{} heap calls after seal", figures.heap_calls_after_seal));
     const auto live = static_cast<double>(a.frames_judged);
-    check(live >= bounds.live_share * static_cast<double>(figures.received),
-          fmt::format("{} of {} received frames have a solve behind them", a.frames_judged, figures.received));
+    check(
+        live >= bounds.live_share * static_cast<double>(figures.received),
+        fmt::format("{} of {} received frames have a solve behind them", a.frames_judged, figures.received));
     if (real_time) return broken;
     check(figures.lost == 0, fmt::format("{} frames lost", figures.lost));
-    check(figures.digest == figures.replayed_digest, "the observation log solves to other weights than were received");
+    check(figures.digest == figures.replayed_digest,
+          "the observation log solves to other weights than were received");
     check(figures.bad_wire == 0, fmt::format("{} wire frames refused", figures.bad_wire));
     return broken;
 }
@@ -387,7 +426,8 @@ std::vector<std::string> broken_bounds(const DemoFigures& figures, const DemoBou
 Result<DemoFigures, FileError> run_demo(const DemoOptions& options, const DemoEvents& events) {
     std::error_code fault;
     std::filesystem::create_directories(options.out_folder, fault);
-    if (fault) return failure(FileError{options.out_folder.string() + ": cannot be made: " + fault.message()});
+    if (fault)
+        return failure(FileError{options.out_folder.string() + ": cannot be made: " + fault.message()});
     events.step("loading the rig and the take");
     auto stage = load_stage(options);
     if (!stage) return failure(stage.error());
@@ -411,7 +451,7 @@ Result<DemoFigures, FileError> run_demo(const DemoOptions& options, const DemoEv
     auto link = open_line(options, line, *daemon);
     if (!link) return failure(link.error());
 
-    Reception reception(*stage, hand_over, options.real_time);
+    Reception reception(*stage, hand_over, server.counters(), options.real_time);
     Health health;
     SessionOptions wanted;
     wanted.streams = kStreamWeights | kStreamMarkers | kStreamStatus;
@@ -432,18 +472,20 @@ Result<DemoFigures, FileError> run_demo(const DemoOptions& options, const DemoEv
     DemoFigures figures;
     const auto end = daemon->wait(5000);
     fill_figures(*stage, server, session, health, end, reception, figures);
-    figures.wall_s = static_cast<double>(std::max(reception.last_received_us(), began_us + 1) - began_us) * 1e-6;
+    figures.wall_s =
+        static_cast<double>(std::max(reception.last_received_us(), began_us + 1) - began_us) * 1e-6;
     figures.solved_per_s = static_cast<double>(figures.solved) / figures.wall_s;
     if (!end || end->exit_code != 0) {
-        return failure(daemon_fault(options, end ? fmt::format("ended with code {}", end->exit_code) : "does not end"));
+        return failure(
+            daemon_fault(options, end ? fmt::format("ended with code {}", end->exit_code) : "does not end"));
     }
-    if (served != ServerEnd::kCompleted) return failure(daemon_fault(options, "left the world before its end"));
+    if (served != ServerEnd::kCompleted)
+        return failure(daemon_fault(options, "left the world before its end"));
     events.step("solving the recorded observations again");
-    const auto replayed = replay_log({options.out_folder / "take.rgo", (options.out_folder / "face.pack").string(), false},
-                                     *pack, [](const FaceState&, double) { return true; });
+    const auto replayed = replay_digest(options, *pack);
     if (!replayed) return failure(replayed.error());
     figures.digest = reception.digest();
-    figures.replayed_digest = replayed->digest;
+    figures.replayed_digest = *replayed;
     events.step("drawing the pictures");
     if (const auto written = write_outputs(options, *stage, pack->pack(), reception, figures); !written) {
         return failure(written.error());

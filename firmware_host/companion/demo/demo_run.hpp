@@ -1,4 +1,5 @@
-// The main job from end to end on one machine: world -> daemon -> serial line -> host, judged against the truth.
+// The main job from end to end on one machine: world -> daemon -> serial line -> host, judged against the
+// truth.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +19,8 @@ struct DemoOptions {
     std::filesystem::path take_csv;
     std::string layout = "60";
     std::filesystem::path out_folder;
-    std::filesystem::path daemon;   // the headrigd to run
-    double seconds = 20.0;          // of performance; 0: to the end of the take
+    std::filesystem::path daemon;  // the headrigd to run
+    double seconds = 20.0;         // of performance; 0: to the end of the take
     std::size_t start_frame = 0;
     std::size_t camera_count = 2;
     DotStyle style = DotStyle::kInk;
@@ -36,14 +37,14 @@ struct LatencyFigures {
 };
 
 struct DemoFigures {
-    std::uint64_t frames = 0;      // of the performance
-    std::uint64_t rendered = 0;    // frame sets
-    std::uint64_t not_sent = 0;    // real time: frames that the world dropped, machine too slow
-    std::uint64_t solved = 0;      // ticks of the daemon with a solve
-    std::uint64_t sent = 0;        // wire frames of the daemon
-    std::uint64_t received = 0;    // states
-    std::uint64_t lost = 0;        // frames of the world for which no state arrived
-    std::uint64_t bad_wire = 0;    // wire frames the host refused
+    std::uint64_t frames = 0;    // of the performance
+    std::uint64_t rendered = 0;  // frame sets
+    std::uint64_t not_sent = 0;  // real time: frames that the world dropped, machine too slow
+    std::uint64_t solved = 0;    // ticks of the daemon with a solve
+    std::uint64_t sent = 0;      // wire frames of the daemon
+    std::uint64_t received = 0;  // states
+    std::uint64_t lost = 0;      // frames of the world for which no state arrived
+    std::uint64_t bad_wire = 0;  // wire frames the host refused
     double wall_s = 0.0;
     double solved_per_s = 0.0;
     LatencyFigures latency;
@@ -64,9 +65,10 @@ struct DemoBounds {
     double live_share = 0.95;  // of the frames, with a solve behind them
 };
 
-// One line for each bound that does not hold; empty when all do. Losses count in lockstep only: in real time they
-// measure the machine.
-[[nodiscard]] std::vector<std::string> broken_bounds(const DemoFigures& figures, const DemoBounds& bounds, bool real_time);
+// One line for each bound that does not hold; empty when all do. Losses count in lockstep only: in real time
+// they measure the machine.
+[[nodiscard]] std::vector<std::string> broken_bounds(const DemoFigures& figures, const DemoBounds& bounds,
+                                                     bool real_time);
 
 struct DemoEvents {
     std::function<void(const std::string& step)> step;

@@ -42,11 +42,13 @@ void render_all(const World& world, WorldRenderer& renderer, std::size_t frame, 
 
 FrameSet frame_set(const World& world, std::size_t frame, const CameraImages& images) {
     FrameSet set;
-    set.capture_us = static_cast<std::int64_t>(std::llround(static_cast<double>(frame) * 1e6 / world.config().rate_hz));
+    set.capture_us =
+        static_cast<std::int64_t>(std::llround(static_cast<double>(frame) * 1e6 / world.config().rate_hz));
     set.camera_count = static_cast<std::uint8_t>(world.cameras().size());
     for (std::size_t c = 0; c < world.cameras().size(); ++c) {
         const HelmetCamera& camera = world.cameras()[c];
-        set.images[c] = ImageView{images.pixels[c].data(), camera.width_px, camera.height_px, camera.width_px};
+        set.images[c] =
+            ImageView{images.pixels[c].data(), camera.width_px, camera.height_px, camera.width_px};
         set.status[c] = CameraStatus::kGood;
     }
     return set;
@@ -62,11 +64,13 @@ void draw_names(const Pipeline& pipeline, const SolvePack& pack, std::size_t cam
     std::vector<int> name_of(seen.size(), -1);
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         const std::int16_t at = pipeline.matches()[camera][k];
-        if (at >= 0 && static_cast<std::size_t>(at) < seen.size()) name_of[static_cast<std::size_t>(at)] = static_cast<int>(k);
+        if (at >= 0 && static_cast<std::size_t>(at) < seen.size())
+            name_of[static_cast<std::size_t>(at)] = static_cast<int>(k);
     }
     for (std::size_t i = 0; i < seen.size(); ++i) {
         const cv::Point at = fixed(static_cast<double>(seen[i].x_px), static_cast<double>(seen[i].y_px));
-        const int radius = cvRound((0.5 * static_cast<double>(seen[i].diameter_px) + 2.0) * kZoom * (1 << kShift));
+        const int radius =
+            cvRound((0.5 * static_cast<double>(seen[i].diameter_px) + 2.0) * kZoom * (1 << kShift));
         const cv::Point plain(at.x >> kShift, at.y >> kShift);
         if (name_of[i] < 0) {
             const cv::Point half(radius >> kShift, radius >> kShift);
@@ -75,8 +79,8 @@ void draw_names(const Pipeline& pipeline, const SolvePack& pack, std::size_t cam
         }
         cv::circle(picture, at, radius, kRing, 1, cv::LINE_AA, kShift);
         const std::string name(pack.marker_names[static_cast<std::size_t>(name_of[i])]);
-        cv::putText(picture, name, plain + cv::Point((radius >> kShift) + 2, -2), cv::FONT_HERSHEY_SIMPLEX, 0.36, kLabel, 1,
-                    cv::LINE_AA);
+        cv::putText(picture, name, plain + cv::Point((radius >> kShift) + 2, -2), cv::FONT_HERSHEY_SIMPLEX,
+                    0.36, kLabel, 1, cv::LINE_AA);
     }
 }
 
@@ -104,9 +108,10 @@ Result<void, FileError> save(const std::filesystem::path& path, const cv::Mat& p
     return write_rgb_image(path, whole.cols, whole.rows, rgb);
 }
 
-void draw_line(const std::vector<double>& values, const cv::Rect& box, const cv::Scalar& colour, int thickness,
-               cv::Mat& picture) {
-    const double step = static_cast<double>(box.width) / static_cast<double>(std::max<std::size_t>(1, values.size() - 1));
+void draw_line(const std::vector<double>& values, const cv::Rect& box, const cv::Scalar& colour,
+               int thickness, cv::Mat& picture) {
+    const double step =
+        static_cast<double>(box.width) / static_cast<double>(std::max<std::size_t>(1, values.size() - 1));
     for (std::size_t i = 1; i < values.size(); ++i) {
         if (std::isnan(values[i]) || std::isnan(values[i - 1])) continue;
         const auto point = [&](std::size_t at) {
@@ -118,7 +123,8 @@ void draw_line(const std::vector<double>& values, const cv::Rect& box, const cv:
     }
 }
 
-void draw_text(cv::Mat& picture, const std::string& text, cv::Point at, double size, const cv::Scalar& colour) {
+void draw_text(cv::Mat& picture, const std::string& text, cv::Point at, double size,
+               const cv::Scalar& colour) {
     cv::putText(picture, text, at, cv::FONT_HERSHEY_SIMPLEX, size, colour, 1, cv::LINE_AA);
 }
 
@@ -140,20 +146,22 @@ void draw_panel(const Curve& curve, const cv::Rect& cell, double rate_hz, cv::Ma
     }
     draw_line(curve.truth, box, {170, 170, 170}, 4, picture);
     draw_line(curve.solved, box, {200, 40, 40}, 1, picture);
-    draw_text(picture, fmt::format("{}   rms {:.3f}", curve.name, curve.rms), {box.x, cell.y + 18}, 0.48, ink);
+    draw_text(picture, fmt::format("{}   rms {:.3f}", curve.name, curve.rms), {box.x, cell.y + 18}, 0.48,
+              ink);
 }
 
 }  // namespace
 
-Result<void, FileError> draw_overlay(const std::filesystem::path& path, const World& world, const SolvePack& pack,
-                                     std::size_t frame) {
+Result<void, FileError> draw_overlay(const std::filesystem::path& path, const World& world,
+                                     const SolvePack& pack, std::size_t frame) {
     CameraImages images;
     images.pixels.assign(world.cameras().size(), std::vector<std::uint8_t>(world.image_bytes()));
     images.sights.assign(world.cameras().size(), std::vector<MarkerSight>(world.marker_count()));
     const auto pipeline = std::make_unique<Pipeline>();
     PipelineConfig config;
     config.rate_hz = world.config().rate_hz;
-    if (!pipeline->configure(pack, config)) return failure(FileError{path.string() + ": the solver refuses the pack"});
+    if (!pipeline->configure(pack, config))
+        return failure(FileError{path.string() + ": the solver refuses the pack"});
     const auto renderer = std::make_unique<WorldRenderer>(world);
     const auto state = std::make_unique<FaceState>();
     const auto report = std::make_unique<FrameReport>();
@@ -166,22 +174,24 @@ Result<void, FileError> draw_overlay(const std::filesystem::path& path, const Wo
         cv::Mat picture = enlarged(world.cameras()[c], images.pixels[c]);
         draw_truth(images.sights[c], picture);
         draw_names(*pipeline, pack, c, picture);
-        draw_text(picture, fmt::format("camera {}  frame {}  {} detections", world.cameras()[c].name, frame,
-                                       report->observations[c]),
+        draw_text(picture,
+                  fmt::format("camera {}  frame {}  {} detections", world.cameras()[c].name, frame,
+                              report->observations[c]),
                   {12, 22}, 0.55, {255, 255, 255});
         views.push_back(picture);
     }
     cv::Mat whole;
     cv::hconcat(views, whole);
-    draw_text(whole, "ring + name: detected and named   square: no name   cross: true place", {12, whole.rows - 12}, 0.5,
-              {255, 255, 255});
+    draw_text(whole, "ring + name: detected and named   square: no name   cross: true place",
+              {12, whole.rows - 12}, 0.5, {255, 255, 255});
     return save(path, whole);
 }
 
-Result<void, FileError> draw_curves(const std::filesystem::path& path, const std::vector<Curve>& curves, double rate_hz,
-                                    const std::string& title) {
+Result<void, FileError> draw_curves(const std::filesystem::path& path, const std::vector<Curve>& curves,
+                                    double rate_hz, const std::string& title) {
     const int rows = static_cast<int>((curves.size() + kColumns - 1) / kColumns);
-    cv::Mat picture(kTitleHeight + rows * kPanelHeight, kColumns * kPanelWidth, CV_8UC3, cv::Scalar(255, 255, 255));
+    cv::Mat picture(kTitleHeight + rows * kPanelHeight, kColumns * kPanelWidth, CV_8UC3,
+                    cv::Scalar(255, 255, 255));
     draw_text(picture, title, {kMargin, 28}, 0.62, {20, 20, 20});
     cv::line(picture, {kMargin, 48}, {kMargin + 40, 48}, {170, 170, 170}, 4, cv::LINE_AA);
     draw_text(picture, "true", {kMargin + 48, 53}, 0.45, {60, 60, 60});
@@ -190,7 +200,8 @@ Result<void, FileError> draw_curves(const std::filesystem::path& path, const std
     for (std::size_t i = 0; i < curves.size(); ++i) {
         const int column = static_cast<int>(i) % kColumns;
         const int row = static_cast<int>(i) / kColumns;
-        const cv::Rect cell(column * kPanelWidth, kTitleHeight + row * kPanelHeight, kPanelWidth, kPanelHeight);
+        const cv::Rect cell(column * kPanelWidth, kTitleHeight + row * kPanelHeight, kPanelWidth,
+                            kPanelHeight);
         draw_panel(curves[i], cell, rate_hz, picture);
     }
     return save(path, picture);

@@ -11,8 +11,9 @@
 
 namespace rig::host {
 
-// Detects and names the markers of `frame` as the daemon does, from a run-up of a few frames before it, and draws: ring =
-// detection, label = name it was given, cross = where the marker truly is, square = a detection without a name.
+// Detects and names the markers of `frame` as the daemon does, from a run-up of a few frames before it, and
+// draws: ring = detection, label = name it was given, cross = where the marker truly is, square = a detection
+// without a name.
 [[nodiscard]] Result<void, FileError> draw_overlay(const std::filesystem::path& path, const World& world,
                                                    const SolvePack& pack, std::size_t frame);
 
@@ -24,7 +25,8 @@ struct Curve {
 };
 
 // One panel a curve, time in seconds along, weight 0..1 up.
-[[nodiscard]] Result<void, FileError> draw_curves(const std::filesystem::path& path, const std::vector<Curve>& curves,
-                                                  double rate_hz, const std::string& title);
+[[nodiscard]] Result<void, FileError> draw_curves(const std::filesystem::path& path,
+                                                  const std::vector<Curve>& curves, double rate_hz,
+                                                  const std::string& title);
 
 }  // namespace rig::host

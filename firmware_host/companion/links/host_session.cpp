@@ -303,7 +303,7 @@ void HostSession::watch_silence(std::int64_t now_us) {
     if (phase_ != SessionPhase::kReady || (options_.streams & kStreamWeights) == 0) return;
     if (!last_weights_us_) last_weights_us_ = now_us;
     const std::int64_t patience_us = kNoWeights_us * std::max<std::int64_t>(1, options_.weights_divider / 30);
-    if (now_us - *last_weights_us_ > patience_us) enter(SessionPhase::kClaiming);
+    if (now_us - *last_weights_us_ > patience_us) enter(SessionPhase::kGreeting);  // it may have restarted
 }
 
 void HostSession::ask(std::int64_t now_us) {

@@ -36,7 +36,7 @@ struct SessionOptions {
     bool names = true;
     std::uint32_t session_id = 0;
     std::string name = "headrig";
-    std::string version;
+    std::string version = {};
 };
 
 // Borrowed during the callback.

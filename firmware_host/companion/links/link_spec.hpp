@@ -8,6 +8,7 @@
 
 #include "core/base/result.hpp"
 #include "hal/byte_link.hpp"
+#include "hal/clock.hpp"
 
 namespace rig::host {
 
@@ -33,5 +34,8 @@ inline constexpr std::string_view kLinkSpecHelp =
 
 // Opened, or why it could not be. May ask a name server.
 [[nodiscard]] Result<std::unique_ptr<ByteLink>, LinkFault> open_link(std::string_view text);
+
+// The host's monotonic clock.
+[[nodiscard]] std::unique_ptr<Clock> host_clock();
 
 }  // namespace rig::host

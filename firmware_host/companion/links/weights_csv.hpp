@@ -14,7 +14,8 @@
 namespace rig::host {
 
 // frame: the state's sequence minus the first one's, so a lost state is a gap; time_s: capture time minus the
-// first one's, so a held state repeats a time. A comma, quote or blank at the edge of a shape's name becomes
+// first one's, so a held state repeats a time; both go back when a board restarts in the middle. A comma,
+// quote or blank at the edge of a shape's name becomes
 // '_'.
 class WeightsCsv {
   public:

@@ -4,8 +4,8 @@
 
 #include "core/pipeline/pipeline.hpp"
 #include "firmware_host/companion/files/whole_file.hpp"
-#include "firmware_host/daemon/observation_log.hpp"
-#include "firmware_host/daemon/stream_digest.hpp"
+#include "firmware_host/take_log/observation_log.hpp"
+#include "firmware_host/take_log/stream_digest.hpp"
 
 namespace rig::host {
 
@@ -13,10 +13,14 @@ namespace {
 
 const char* fault_of(ObservationLogError error) {
     switch (error) {
-        case ObservationLogError::kOpen: return "cannot be read";
-        case ObservationLogError::kFormat: return "is no observation log; `headrigd --log-observations FILE` writes one";
-        case ObservationLogError::kCut: return "ends inside a record: the recording was cut; all ticks before it were solved";
-        case ObservationLogError::kDamaged: return "holds a damaged record; all ticks before it were solved";
+        case ObservationLogError::kOpen:
+            return "cannot be read";
+        case ObservationLogError::kFormat:
+            return "is no observation log; `headrigd --log-observations FILE` writes one";
+        case ObservationLogError::kCut:
+            return "ends inside a record: the recording was cut; all ticks before it were solved";
+        case ObservationLogError::kDamaged:
+            return "holds a damaged record; all ticks before it were solved";
     }
     return "cannot be used";
 }
@@ -39,22 +43,25 @@ ObservationFrame frame_of(const ObservationTick& tick, std::uint8_t camera_count
     return frame;
 }
 
-Result<void, FileError> check_fit(const ReplayRequest& request, const OpenedPack& pack, const ObservationLogHeader& header) {
+Result<void, FileError> check_fit(const ReplayRequest& request, const OpenedPack& pack,
+                                  const ObservationLogHeader& header) {
     const std::string log = request.log.string();
     if (header.pack_hash != pack.manifest().manifest_hash && !request.another_pack) {
         return failure(FileError{log + ": was recorded with another pack than " + request.pack_name +
                                  "; --another-pack solves it all the same"});
     }
     if (pack.pack().camera_count != header.camera_count) {
-        return failure(FileError{request.pack_name + ": " + std::to_string(pack.pack().camera_count) + " cameras, but " + log +
-                                 " was recorded with " + std::to_string(header.camera_count)});
+        return failure(FileError{request.pack_name + ": " + std::to_string(pack.pack().camera_count) +
+                                 " cameras, but " + log + " was recorded with " +
+                                 std::to_string(header.camera_count)});
     }
     return {};
 }
 
 }  // namespace
 
-Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const OpenedPack& pack, const ReplayedTick& tick) {
+Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const OpenedPack& pack,
+                                           const ReplayedTick& tick) {
     const auto bytes = read_whole_file(request.log);
     if (!bytes) return failure(bytes.error());
     auto reader = ObservationLogReader::open(*bytes);
@@ -62,7 +69,8 @@ Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const O
     if (const auto fits = check_fit(request, pack, reader->header()); !fits) return failure(fits.error());
     const auto pipeline = std::make_unique<Pipeline>();
     if (!pipeline->configure(pack.pack(), config_of(reader->header()))) {
-        return failure(FileError{request.pack_name + ": the solver refuses this pack; train it again with this version"});
+        return failure(FileError{request.pack_name +
+                                 ": the solver refuses this pack; train it again with this version"});
     }
     const auto state = std::make_unique<FaceState>();
     const auto report = std::make_unique<FrameReport>();

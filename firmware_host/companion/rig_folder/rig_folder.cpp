@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "core/limits.hpp"
 #include "firmware_host/companion/files/whole_file.hpp"

@@ -42,6 +42,8 @@ struct ServerCounters {
     std::atomic<std::uint64_t> overdue{0};    // real time: rendering fell behind by more than a frame
     std::atomic<std::uint64_t> ignored{0};    // messages of the daemon that make no sense
     std::atomic<std::uint64_t> lines_set{0};  // kSetLine messages
+    std::atomic<std::int64_t> start_us{
+        0};  // mid-exposure of frame 0, on the run's clock; 0 before a daemon came
 };
 
 enum class ServerEnd : std::uint8_t {

@@ -74,6 +74,7 @@ std::int64_t WorldSession::exposure_us(std::size_t frame) const {
 
 bool WorldSession::run_lockstep(const WorldServer::Progress& progress) {
     start_us_ = kLockstepStart_us;
+    counters_.start_us = start_us_;
     for (std::size_t frame = 0; frame < world_.frame_count(); ++frame) {
         std::uint32_t slot = 0;
         if (!wait_for_frame(frame, kForever, slot)) return false;
@@ -95,6 +96,7 @@ bool WorldSession::run_real_time(const WorldServer::Progress& progress) {
     std::uint32_t slot = 0;
     if (!wait_for_frame(0, kForever, slot)) return false;
     start_us_ = monotonic_us() + kFirstFrameLead_us;
+    counters_.start_us = start_us_;
     for (std::size_t frame = 0; frame < world_.frame_count(); ++frame) {
         const std::int64_t half = exposure_us(frame) / 2;
         const std::int64_t middle = start_us_ + offset_us(frame);

@@ -95,7 +95,8 @@ std::string many_names(std::size_t count) {
 
 const float kNan = std::numeric_limits<float>::quiet_NaN();
 
-std::vector<Damage> damages() {
+// Each file away, empty, cut, or of another type.
+std::vector<Damage> file_damages() {
     std::vector<Damage> list;
     for (const char* file : {"vertices.npy", "triangles.npy", "triangle_part.npy", "parts.txt",
                              "blendshapes.txt", "delta_offsets.npy", "delta_vertex.npy", "delta_xyz.npy"}) {
@@ -113,6 +114,11 @@ std::vector<Damage> damages() {
                             [file](const fs::path& f) { put<std::int16_t>(f / file, {1}, {0}); }});
         }
     }
+    return list;
+}
+
+std::vector<Damage> mesh_damages() {
+    std::vector<Damage> list;
     const auto add = [&](std::string label, std::string file, std::string fault, auto spoil) {
         list.push_back({std::move(label), std::move(file), std::move(fault), spoil});
     };
@@ -141,6 +147,14 @@ std::vector<Damage> damages() {
     add("part_range", "triangle_part.npy", "part 2", [](const fs::path& f) {
         put<std::uint8_t>(f / "triangle_part.npy", {8}, std::vector<std::uint8_t>(8, 2));
     });
+    return list;
+}
+
+std::vector<Damage> shape_damages() {
+    std::vector<Damage> list;
+    const auto add = [&](std::string label, std::string file, std::string fault, auto spoil) {
+        list.push_back({std::move(label), std::move(file), std::move(fault), spoil});
+    };
     list.push_back(text_damage("part_twice", "parts.txt", "two parts", "face\nface\n"));
     list.push_back(text_damage("shape_twice", "blendshapes.txt", "two shapes are named 'a'", "a\na\n"));
     list.push_back(text_damage("shape_blank", "blendshapes.txt", "cannot be the name", "a\n\n"));
@@ -190,7 +204,11 @@ TEST_P(MalformedRig, NamesFileAndFault) {
     EXPECT_NE(result.error().message.find(GetParam().fault), std::string::npos) << result.error().message;
 }
 
-INSTANTIATE_TEST_SUITE_P(Table, MalformedRig, testing::ValuesIn(damages()),
+INSTANTIATE_TEST_SUITE_P(Files, MalformedRig, testing::ValuesIn(file_damages()),
+                         [](const auto& row) { return row.param.label; });
+INSTANTIATE_TEST_SUITE_P(Mesh, MalformedRig, testing::ValuesIn(mesh_damages()),
+                         [](const auto& row) { return row.param.label; });
+INSTANTIATE_TEST_SUITE_P(Shapes, MalformedRig, testing::ValuesIn(shape_damages()),
                          [](const auto& row) { return row.param.label; });
 
 }  // namespace

@@ -32,6 +32,20 @@ TEST(WritePack, KeepsTheManifestInOneRead) {
     EXPECT_LE(opened->manifest().manifest_bytes, kMaxManifestBytes);
 }
 
+// An empty vector of cameras lies where the name before it ends, aligned or not.
+TEST(WritePack, OpensWhateverTheLengthOfItsName) {
+    for (const std::uint8_t cameras : {std::uint8_t{0}, std::uint8_t{1}, std::uint8_t{2}}) {
+        const SamplePack sample({.cameras = cameras});
+        for (std::size_t length = 1; length <= kMaxNameBytes; ++length) {
+            PackIdentity identity;
+            identity.name = std::string(length, 'n');
+            const auto opened = open_pack_copy(write_pack(sample.view, identity, sha256), "named");
+            ASSERT_TRUE(opened.has_value())
+                << length << " bytes, " << int{cameras} << " cameras: " << opened.error().message;
+        }
+    }
+}
+
 TEST(SavePack, WritesNothingThatCouldNotBeOpened) {
     const TempFolder folder;
     SamplePack sample({});

@@ -49,14 +49,14 @@ double core_rms(const SolvePack& pack, const Take& take) {
 }
 
 TEST(TrainRbf, LearnsATakeAndCoreEvaluatesTheSame) {
-    const TinyRig tiny = tiny_rig(24, 4, 1200);
-    const auto pack = train_tiny(tiny);
+    const TinyRig tiny = tiny_rig(24, 4, 600);
+    const auto pack = train_tiny(tiny, {.centres = 60});
     ASSERT_TRUE(pack.has_value()) << pack.error().message;
     const RbfTrainingReport& report = *pack->report.rbf;
-    EXPECT_EQ(report.frames, 1200U);
+    EXPECT_EQ(report.frames, 600U);
     EXPECT_GE(report.dimensions, 3U);
-    EXPECT_LE(report.centres, 100U);
-    EXPECT_GE(report.centres, 80U);
+    EXPECT_LE(report.centres, 60U);
+    EXPECT_GE(report.centres, 50U);
     EXPECT_GT(report.variance_kept, 0.95);
     // The weights' own spread about their means is 0.38: the model explains nearly all of it.
     EXPECT_LT(report.in_take_rms, 0.1);
@@ -107,6 +107,9 @@ TEST(TrainRbf, SaysWhatIsMissing) {
 }
 
 TEST(TrainRbf, RepeatsThePublishedTrialOnTheRecordedTake) {
+#ifdef __SANITIZE_ADDRESS__
+    GTEST_SKIP() << "minutes of arithmetic under the sanitizers; the tests above run the same code there";
+#endif
     RIG_SHARED_DATA_OR_SKIP(path, "rig");
     const auto rig = load_rig(path);
     ASSERT_TRUE(rig.has_value()) << rig.error().message;

@@ -22,6 +22,7 @@ using test::TinyRig;
 
 void expect_equal(std::span<const float> got, std::span<const float> wanted) {
     ASSERT_EQ(got.size(), wanted.size());
+    if (wanted.empty()) return;
     EXPECT_EQ(std::memcmp(got.data(), wanted.data(), got.size_bytes()), 0);
 }
 
@@ -63,7 +64,7 @@ TEST(Train, WhatIsTrainedIsWhatIsOpened) {
         TrainOptions options;
         options.solver = solver;
         options.takes = {tiny.take};
-        options.rbf.centres = 20;
+        options.rbf.centres = 12;
         const auto trained = train(tiny.rig, tiny.layout, options);
         ASSERT_TRUE(trained.has_value()) << trained.error().message;
         expect_round_trip(*trained);

@@ -1,4 +1,4 @@
-#include "firmware_host/daemon/stream_digest.hpp"
+#include "firmware_host/take_log/stream_digest.hpp"
 
 #include <array>
 

@@ -1,4 +1,4 @@
-#include "firmware_host/daemon/observation_log.hpp"
+#include "firmware_host/take_log/observation_log.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,174 @@
+// bench_vision    detection against what OpenCV offers, on the same frames in one run: the shared faces where
+// they are present, and drawn scenes with clutter. Times are of one thread, methods interleaved so that all
+// share the weather.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdlib>
+#include <ctime>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/detect/detector.hpp"
+#include "tests/bench/vision/opencv_methods.hpp"
+#include "tests/support/dot_scene/dot_scene.hpp"
+#include "tests/support/dot_scene/match.hpp"
+#include "tests/support/image_truth/image_truth.hpp"
+#include "tests/support/shared_data.hpp"
+
+namespace {
+
+using namespace rig;
+
+struct BenchFrame {
+    std::string set;
+    test::Picture picture;
+    std::vector<test::TrueDot> dots;
+    bool bright = false;
+};
+
+struct Method {
+    const char* name;
+    std::function<std::vector<test::SeenDot>(const BenchFrame&)> look;
+    bool counts_only = false;
+};
+
+struct Tally {
+    test::MatchCounts counts;
+    std::vector<double> times_ms;
+};
+
+void add_shared_faces(std::vector<BenchFrame>& frames) {
+    const auto folder = test::shared_data("images");
+    if (folder.empty()) {
+        fmt::print("no ../shared/data/images: drawn scenes only\n");
+        return;
+    }
+    auto images = test::read_true_images(folder);
+    if (!images) {
+        fmt::print(stderr, "bench_vision: {}\n", images.error().message);
+        std::exit(3);
+    }
+    const auto detector = std::make_unique<Detector>();
+    for (test::TrueImage& image : *images) {
+        Observations observations;
+        DetectorReport report;
+        detector->reset();
+        detector->detect(image.image.view(), observations,
+                         report);  // polarity, for the methods that must be told
+        frames.push_back({"faces",
+                          {image.image.width_px, image.image.height_px, std::move(image.image.pixels)},
+                          std::move(image.dots),
+                          report.polarity == MarkerPolarity::kBright});
+    }
+}
+
+void add_scenes(std::vector<BenchFrame>& frames) {
+    for (std::uint64_t k = 0; k < 6; ++k) {
+        const bool bright = k % 2 == 1;
+        test::Scene scene = test::lattice_scene(10.0, 2.2, bright, 100 + k);
+        scene.width_px = 640;
+        scene.height_px = 480;
+        scene.clutter = {.lines = 10, .hairs = 20, .patches = 4, .shadows = 4, .silhouette = true};
+        BenchFrame frame{"scenes", test::render(scene), {}, bright};
+        for (const test::SceneDot& dot : scene.dots) frame.dots.push_back({dot.x_px, dot.y_px, 3.0, true});
+        frames.push_back(std::move(frame));
+    }
+}
+
+std::vector<test::SeenDot> run_detector(Detector& detector, const BenchFrame& frame,
+                                        MarkerPolarity polarity) {
+    DetectorConfig config;
+    config.polarity = polarity;
+    if (!detector.configure(config)) std::abort();
+    static Observations observations;
+    DetectorReport report;
+    detector.detect(frame.picture.view(), observations, report);
+    return test::seen_dots(observations);
+}
+
+// Of this thread: what other programs take does not count, though the caches they spoil do.
+double cpu_ms() {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+double percentile(std::vector<double> values, double part) {
+    std::sort(values.begin(), values.end());
+    return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1))];
+}
+
+void print_table(const std::string& set, const std::vector<BenchFrame>& frames,
+                 const std::vector<Method>& methods, int repeat) {
+    std::vector<Tally> tallies(methods.size());
+    for (int round = 0; round < repeat; ++round) {
+        for (const BenchFrame& frame : frames) {
+            if (frame.set != set) continue;
+            for (std::size_t m = 0; m < methods.size(); ++m) {
+                const double start_ms = cpu_ms();
+                const std::vector<test::SeenDot> seen = methods[m].look(frame);
+                tallies[m].times_ms.push_back(cpu_ms() - start_ms);
+                if (round == 0) tallies[m].counts += test::match(frame.dots, seen);
+            }
+        }
+    }
+    if (tallies[0].times_ms.empty()) return;
+    fmt::print("\n{}\n{:<42}{:>9}{:>9}{:>10}{:>9}{:>11}\n", set, "method", "p50 ms", "p99 ms", "rms px",
+               "recall", "precision");
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+        const Tally& tally = tallies[m];
+        fmt::print("{:<42}{:>9.3f}{:>9.3f}", methods[m].name, percentile(tally.times_ms, 0.5),
+                   percentile(tally.times_ms, 0.99));
+        if (methods[m].counts_only) {
+            fmt::print("{:>10}{:>9}{:>11}\n", "-", "-", "-");
+        } else {
+            fmt::print("{:>10.3f}{:>9.3f}{:>11.3f}\n", tally.counts.rms_px(), tally.counts.recall(),
+                       tally.counts.precision());
+        }
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app{"bench_vision: marker detection against OpenCV on the same frames"};
+    int repeat = 50;
+    app.add_option("--repeat", repeat, "rounds over all frames")
+        ->check(CLI::Range(1, 100000))
+        ->capture_default_str();
+    CLI11_PARSE(app, argc, argv);
+    bench::use_one_thread();
+
+    std::vector<BenchFrame> frames;
+    add_shared_faces(frames);
+    add_scenes(frames);
+    const auto detector = std::make_unique<Detector>();
+    volatile std::size_t sink = 0;
+    const std::vector<Method> methods = {
+        {"detector, polarity given",
+         [&](const BenchFrame& f) {
+             return run_detector(*detector, f, f.bright ? MarkerPolarity::kBright : MarkerPolarity::kDark);
+         }},
+        {"detector, polarity found (first frames)",
+         [&](const BenchFrame& f) { return run_detector(*detector, f, MarkerPolarity::kAuto); }},
+        {"OpenCV SimpleBlobDetector",
+         [](const BenchFrame& f) { return bench::simple_blob_detector(f.picture.view(), f.bright); }},
+        {"OpenCV threshold, findContours",
+         [](const BenchFrame& f) { return bench::threshold_contours(f.picture.view(), f.bright); }},
+        {"OpenCV threshold, connectedComponents",
+         [](const BenchFrame& f) { return bench::threshold_components(f.picture.view(), f.bright); }},
+        {"plain threshold and count",
+         [&](const BenchFrame& f) {
+             sink = sink + bench::threshold_count(f.picture.view(), f.bright);
+             return std::vector<test::SeenDot>{};
+         },
+         true},
+    };
+    print_table("faces", frames, methods, repeat);
+    print_table("scenes", frames, methods, repeat);
+    return 0;
+}

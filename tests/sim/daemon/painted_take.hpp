@@ -1,0 +1,39 @@
+// Pictures of the synthetic face, good enough to be solved: dark discs on noisy skin, as two helmet cameras
+// see them. Not for judging accuracy.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/pack/solve_pack.hpp"
+#include "hal/sim/memory_frame_source.hpp"
+#include "tests/support/synthetic_face.hpp"
+
+namespace rig::test {
+
+inline constexpr double kTakeRate_hz = 60.0;
+
+class PaintedTake {
+  public:
+    PaintedTake();
+    [[nodiscard]] const SolvePack& pack() const { return pack_; }
+    // The same bytes for the same camera and frame, always.
+    void paint(std::size_t camera, std::uint32_t frame, std::span<std::uint8_t> pixels) const;
+    [[nodiscard]] sim::FramePainter painter(std::size_t camera) const {
+        return [this, camera](std::uint32_t frame, std::span<std::uint8_t> pixels) {
+            paint(camera, frame, pixels);
+        };
+    }
+    [[nodiscard]] int width_px() const { return pack_.cameras[0].width_px; }
+    [[nodiscard]] int height_px() const { return pack_.cameras[0].height_px; }
+
+  private:
+    SyntheticFace face_;
+    SolvePack pack_;
+};
+
+// One for all tests of a program: it is the same.
+[[nodiscard]] const PaintedTake& painted_take();
+
+}  // namespace rig::test
