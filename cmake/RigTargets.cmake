@@ -46,6 +46,11 @@ function(rig_program name)
     target_link_libraries(${name} PRIVATE ${ARG_DEPS})
 endfunction()
 
+# rig_thin(target)    for code that runs once, reads a command line and calls others: compile time counts, speed does not
+function(rig_thin target)
+    target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
+endfunction()
+
 # rig_test(NAME SOURCES ... [DEPS ...] [LABELS ...] [TIMEOUT seconds])    a GoogleTest program, one ctest entry per
 # program (tests inside it are listed by --gtest_list_tests). A skip is reported by GoogleTest itself.
 function(rig_test name)
@@ -53,7 +58,10 @@ function(rig_test name)
     rig_program(${name} SOURCES ${ARG_SOURCES} DEPS ${ARG_DEPS} GTest::gtest GTest::gtest_main)
     set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
     # Tests run for seconds and compile for minutes: what they test is fully optimised, they are not.
-    target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+    rig_thin(${name})
+    # Read once for all of them; the definitions are core's, so that the same Eigen fits every test.
+    target_compile_definitions(${name} PRIVATE EIGEN_DONT_VECTORIZE EIGEN_DONT_PARALLELIZE)
+    target_precompile_headers(${name} REUSE_FROM tests_headers)
     add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
     if(NOT ARG_TIMEOUT)
         set(ARG_TIMEOUT 300)

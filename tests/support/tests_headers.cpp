@@ -1,0 +1,2 @@
+// Nothing: this target exists for its precompiled headers.
+int main() {}
