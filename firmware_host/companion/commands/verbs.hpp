@@ -18,12 +18,14 @@ inline constexpr int kExitInterrupted = 130;
 // alphabetical order.
 void add_demo_verb(CLI::App& app, int& exit_code);
 void add_detect_verb(CLI::App& app, int& exit_code);
+void add_fit_verb(CLI::App& app, int& exit_code);
 void add_import_verb(CLI::App& app, int& exit_code);
 void add_info_verb(CLI::App& app, int& exit_code);
 void add_monitor_verb(CLI::App& app, int& exit_code);
 void add_pack_verb(CLI::App& app, int& exit_code);
 void add_record_verb(CLI::App& app, int& exit_code);
 void add_replay_verb(CLI::App& app, int& exit_code);
+void add_report_verb(CLI::App& app, int& exit_code);
 void add_sample_verb(CLI::App& app, int& exit_code);
 void add_solve_verb(CLI::App& app, int& exit_code);
 void add_status_verb(CLI::App& app, int& exit_code);
