@@ -54,6 +54,12 @@ void print_noise(const FitCommand& command, const MarkerTake& take) {
 void print_result(const FitCommand& command, const LayoutFit& fit, const MarkerTake& take) {
     print_rounds(fit);
     print_noise(command, take);
+    if (fit.projection_refused) {
+        print_error(
+            fmt::format("warning: the face is not neutral in frames {}, or the layout was better than they "
+                        "are: markers started from the layout; name neutral frames with --neutral",
+                        command.neutral));
+    }
     if (!fit.converged) {
         print_error(fmt::format("warning: markers still moved after {} rounds; allow more with --rounds",
                                 command.options.most_rounds));

@@ -179,10 +179,10 @@ void print_residual(const TrainedPack& pack, const MarkerTake& take) {
     if (!residual) return;
     fmt::print("residual of a coordinate after the solve: {:.4f} mm\n", *residual);
     if (*residual <= kResidualAlarm * pack.noise_mm) return;
-    print_error(
-        fmt::format("warning: the residual is {:.1f} times the noise: markers are not where the layout says, "
-                    "or the shapes cannot make these faces; see `headrig fit`",
-                    *residual / pack.noise_mm));
+    print_error(fmt::format(
+        "warning: the residual is {:.1f} times the noise: markers are not where the layout says, names "
+        "are swapped, or the shapes cannot make these faces; see `headrig fit`",
+        *residual / pack.noise_mm));
 }
 
 int run_train(TrainCommand& command) {

@@ -20,8 +20,7 @@ namespace {
 using Eigen::MatrixXd;
 
 constexpr std::size_t kLeastFrames = 10;  // that show a marker: fewer say nothing about how it moves
-// The solve hides a share of an offset in the weights; it shows once the rest is gone.
-constexpr int kOffsetPasses = 1;
+constexpr int kFirstAlignments = 6;       // over the take, of the layout as given
 constexpr double kFarOffMm = 20.0;        // a marker lies on the skin; more is a wrong rig, unit or order
 
 Double3 triple(const Vec3& v) {
@@ -32,7 +31,16 @@ Vec3 vector(const Float3& v) {
     return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
 }
 
-// Everything the rounds share.
+// What a round changes.
+struct Placed {
+    MarkerLayout layout;
+    Similarity face_from_take;
+    SolvedTake solved;
+    std::vector<MarkerMoments> moments;
+    std::vector<double> marker_rms_mm;
+    double noise_mm = 0.1;  // of one coordinate as the solver should see it: misplacement included
+};
+
 struct Fitting {
     const Rig& rig;
     const FitOptions& options;
@@ -42,12 +50,7 @@ struct Fitting {
     std::vector<Double3> normals;
     std::vector<std::vector<std::uint8_t>> parts;  // of the mesh that each marker may sit on
 
-    MarkerLayout layout;
-    Similarity face_from_take;
-    SolvedTake solved;
-    std::vector<MarkerMoments> moments;
-    std::vector<double> marker_rms_mm;
-    double noise_mm;  // of one coordinate as the solver should see it: misplacement included
+    Placed now;
 };
 
 Result<std::vector<Vec3>, FileError> neutral_positions(const MarkerLayout& layout, const MarkerTake& take,
@@ -146,7 +149,7 @@ MatrixXd motion_of(const Fitting& fitting, const LayoutMarker& marker) {
 // The take in the rig's frame and scale.
 MarkerTake aligned(const Fitting& fitting) {
     MarkerTake out = fitting.take;
-    for (Vec3& p : out.positions_mm) p = fitting.face_from_take.apply(p);
+    for (Vec3& p : out.positions_mm) p = fitting.now.face_from_take.apply(p);
     return out;
 }
 
@@ -154,24 +157,24 @@ MarkerTake aligned(const Fitting& fitting) {
 Result<FitRound, FileError> solve_round(Fitting& fitting, const std::function<void(double)>& progress) {
     TrainOptions training;
     training.solver = SolverKind::kBoxQp;
-    training.noise_mm = fitting.noise_mm;
+    training.noise_mm = fitting.now.noise_mm;
     training.rate_hz = std::max(1.0, fitting.take.rate_hz);
     training.temporal.mode = TemporalPull::Mode::kOff;  // a pull this noisy would damp the motion
-    const auto pack = train(fitting.rig, fitting.layout, training);
+    const auto pack = train(fitting.rig, fitting.now.layout, training);
     if (!pack) return failure(pack.error());
     const MarkerTake in_face = aligned(fitting);
-    fitting.solved = solve_take(pack->view(), in_face, fitting.options.stabilised, progress);
-    fitting.moments = take_moments(in_face, fitting.solved);
+    fitting.now.solved = solve_take(pack->view(), in_face, fitting.options.stabilised, progress);
+    fitting.now.moments = take_moments(in_face, fitting.now.solved);
     FitRound round;
     double sum = 0.0;
     double count = 0.0;
-    const std::vector<double> before = std::move(fitting.marker_rms_mm);
-    fitting.marker_rms_mm.clear();
+    const std::vector<double> before = std::move(fitting.now.marker_rms_mm);
+    fitting.now.marker_rms_mm.clear();
     for (std::size_t k = 0; k < fitting.take.marker_count; ++k) {
-        const MarkerMoments& moments = fitting.moments[k];
-        const double mean_square = moments.mean_square_mm2(motion_of(fitting, fitting.layout.markers[k]));
+        const MarkerMoments& moments = fitting.now.moments[k];
+        const double mean_square = moments.mean_square_mm2(motion_of(fitting, fitting.now.layout.markers[k]));
         const double rms = std::sqrt(mean_square);
-        fitting.marker_rms_mm.push_back(rms);
+        fitting.now.marker_rms_mm.push_back(rms);
         sum += mean_square * moments.count;
         count += moments.count;
         round.mean_mm += rms / static_cast<double>(fitting.take.marker_count);
@@ -179,7 +182,7 @@ Result<FitRound, FileError> solve_round(Fitting& fitting, const std::function<vo
         if (!before.empty()) round.change_mm = std::max(round.change_mm, std::abs(rms - before[k]));
     }
     round.rms_mm = count > 0.0 ? std::sqrt(sum / count) : 0.0;
-    fitting.noise_mm = std::clamp(round.rms_mm / std::sqrt(3.0), fitting.options.noise_mm, 100.0);
+    fitting.now.noise_mm = std::clamp(round.rms_mm / std::sqrt(3.0), fitting.options.noise_mm, 100.0);
     return round;
 }
 
@@ -195,8 +198,8 @@ void put(const Fitting& fitting, std::size_t triangle, const Vec3& b, LayoutMark
 std::size_t project_markers(Fitting& fitting) {
     std::size_t moved = 0;
     for (std::size_t k = 0; k < fitting.take.marker_count; ++k) {
-        LayoutMarker& marker = fitting.layout.markers[k];
-        const Vec3 at = fitting.face_from_take.apply(fitting.neutral_mm[k]);
+        LayoutMarker& marker = fitting.now.layout.markers[k];
+        const Vec3 at = fitting.now.face_from_take.apply(fitting.neutral_mm[k]);
         const auto nearest = nearest_triangles(fitting.rig, triple(at), 1, fitting.parts[k]);
         if (nearest.empty()) continue;  // a mesh without triangles: the place as given is all there is
         const Int3 before = marker.vertices;
@@ -211,14 +214,14 @@ std::size_t project_markers(Fitting& fitting) {
 std::size_t choose_places(Fitting& fitting) {
     std::size_t moved = 0;
     for (std::size_t k = 0; k < fitting.take.marker_count; ++k) {
-        LayoutMarker& marker = fitting.layout.markers[k];
-        const MarkerMoments& moments = fitting.moments[k];
+        LayoutMarker& marker = fitting.now.layout.markers[k];
+        const MarkerMoments& moments = fitting.now.moments[k];
         if (moments.count <= 0.0) continue;
         const bool by_take = fitting.options.placement == Placement::kTake;
         // Where the take puts the marker's neutral position, or where the neutral frames saw it.
         const Vec3 at = by_take
                             ? vector(marker.neutral_mm) + moments.mean_error_mm(motion_of(fitting, marker))
-                            : fitting.face_from_take.apply(fitting.neutral_mm[k]);
+                            : fitting.now.face_from_take.apply(fitting.neutral_mm[k]);
         double least = moments.mean_square_mm2(motion_of(fitting, marker));
         const Int3 before = marker.vertices;
         for (const SurfacePoint& near :
@@ -244,63 +247,105 @@ std::size_t choose_places(Fitting& fitting) {
 // The similarity that fits the solved model best over the take: landmarks were only the start.
 void align_again(Fitting& fitting) {
     std::vector<MatrixXd> motions;
-    for (const LayoutMarker& marker : fitting.layout.markers) motions.push_back(motion_of(fitting, marker));
+    for (const LayoutMarker& marker : fitting.now.layout.markers)
+        motions.push_back(motion_of(fitting, marker));
     SimilarityFit fit;
-    Eigen::VectorXd z(fitting.solved.weights.cols() + 1);
+    Eigen::VectorXd z(fitting.now.solved.weights.cols() + 1);
     for (std::size_t f = 0; f < fitting.take.frame_count; ++f) {
-        if (!fitting.solved.solved[f]) continue;
+        if (!fitting.now.solved.solved[f]) continue;
         z[0] = 1.0;
-        z.tail(fitting.solved.weights.cols()) =
-            fitting.solved.weights.row(static_cast<Eigen::Index>(f)).transpose();
+        z.tail(fitting.now.solved.weights.cols()) =
+            fitting.now.solved.weights.row(static_cast<Eigen::Index>(f)).transpose();
         for (std::size_t k = 0; k < fitting.take.marker_count; ++k) {
             if (!fitting.take.seen(f, k)) continue;
-            const Vec3 x = fitting.solved.headset_from_face[f].apply_inverse(
-                fitting.face_from_take.apply(fitting.take.at(f, k)));
+            const Vec3 x = fitting.now.solved.headset_from_face[f].apply_inverse(
+                fitting.now.face_from_take.apply(fitting.take.at(f, k)));
             fit.add(x, motions[k] * z);
         }
     }
     // A change of frame before the slip is a change of frame after another slip, which is found anew.
     if (const auto step = fit.solve(fitting.options.scaled)) {
-        fitting.face_from_take = compose(*step, fitting.face_from_take);
+        fitting.now.face_from_take = compose(*step, fitting.now.face_from_take);
     }
 }
 
 Result<void, FileError> check_distance(const Fitting& fitting) {
-    for (std::size_t k = 0; k < fitting.marker_rms_mm.size(); ++k) {
-        if (fitting.marker_rms_mm[k] <= kFarOffMm) continue;
-        return failure(
-            FileError{fmt::format("marker '{}' stays {:.1f} mm from the mesh over the take; check that take "
-                                  "and layout name the same "
-                                  "markers in the same order, the neutral frames, and the rig",
-                                  printable(fitting.layout.markers[k].name), fitting.marker_rms_mm[k])});
+    for (std::size_t k = 0; k < fitting.now.marker_rms_mm.size(); ++k) {
+        if (fitting.now.marker_rms_mm[k] <= kFarOffMm) continue;
+        return failure(FileError{
+            fmt::format("marker '{}' stays {:.1f} mm from the mesh over the take; check that take "
+                        "and layout name the same "
+                        "markers in the same order, the neutral frames, and the rig",
+                        printable(fitting.now.layout.markers[k].name), fitting.now.marker_rms_mm[k])});
+    }
+    return {};
+}
+
+// Where the round's markers start from: step 1 and 2, then step 4 to 6 of the source.
+std::size_t place_markers(Fitting& fitting, std::size_t round) {
+    if (round == 0) return 0;
+    if (round == 1) return project_markers(fitting);
+    const std::size_t moved = choose_places(fitting);
+    align_again(fitting);
+    return moved;
+}
+
+Result<void, FileError> run_rounds(Fitting& fitting, const FitProgress& progress, LayoutFit& out) {
+    const FitOptions& options = fitting.options;
+    const Similarity landmarks = fitting.now.face_from_take;
+    Placed given;
+    for (std::size_t r = 0; r <= options.most_rounds && !out.converged; ++r) {
+        const auto tell = [&](double share) {
+            if (progress)
+                progress((static_cast<double>(r) + share) / static_cast<double>(options.most_rounds + 1),
+                         fmt::format("round {}", r));
+        };
+        tell(0.0);
+        const std::size_t moved = place_markers(fitting, r);
+        // The layout as given at its best, should the neutral frames turn out not to be neutral: landmarks in
+        // an expression align badly, the whole take does not mind.
+        const int solves = r == 0 ? 1 + kFirstAlignments : 1;
+        auto round = solve_round(fitting, [&](double share) { tell(share / solves); });
+        for (int again = 1; again < solves && round; ++again) {
+            align_again(fitting);
+            round = solve_round(fitting, [&](double share) { tell((again + share) / solves); });
+        }
+        if (!round) return failure(round.error());
+        round->moved = moved;
+        if (r == 0) round->change_mm = 0.0;
+        out.rounds.push_back(*round);
+        if (r == 0) {
+            given = fitting.now;
+            fitting.now.face_from_take = landmarks;  // the projection trusts the neutral frames
+            for (const double rms_mm : given.marker_rms_mm) out.markers.push_back({.given_mm = rms_mm});
+        }
+        // Neutral frames that are not neutral put every marker where the expression had it.
+        out.projection_refused = out.projection_refused || (r == 1 && round->rms_mm > out.rounds[0].rms_mm);
+        if (r == 1 && out.projection_refused) fitting.now = std::move(given);
+        out.converged = r > 1 && round->change_mm < options.threshold_mm;
     }
     return {};
 }
 
 // The offsets, the scale of the rig and what is told of each marker.
 Result<void, FileError> finish(Fitting& fitting, const MarkerLayout& rough, LayoutFit& out) {
-    const double scale = 1.0 / fitting.face_from_take.scale;
-    for (std::size_t k = 0; k < fitting.layout.markers.size(); ++k) {
-        LayoutMarker& marker = fitting.layout.markers[k];
+    const double scale = 1.0 / fitting.now.face_from_take.scale;
+    for (std::size_t k = 0; k < fitting.now.layout.markers.size(); ++k) {
+        LayoutMarker& marker = fitting.now.layout.markers[k];
         FittedMarker& told = out.markers[k];
-        told.rms_mm = fitting.marker_rms_mm[k];
+        told.rms_mm = fitting.now.marker_rms_mm[k];
         told.walked_mm = (vector(marker.neutral_mm) - vector(rough.markers[k].neutral_mm)).norm();
-        told.frames = static_cast<std::size_t>(fitting.moments[k].count);
+        told.frames = static_cast<std::size_t>(fitting.now.moments[k].count);
+        const Vec3 offset = fitting.now.moments[k].mean_error_mm(motion_of(fitting, marker));
+        for (std::size_t a = 0; a < 3; ++a)
+            marker.offset_mm[a] = static_cast<float>(offset[static_cast<Eigen::Index>(a)]);
     }
-    for (int pass = 0; pass < kOffsetPasses; ++pass) {
-        for (std::size_t k = 0; k < fitting.layout.markers.size(); ++k) {
-            LayoutMarker& marker = fitting.layout.markers[k];
-            const Vec3 more = fitting.moments[k].mean_error_mm(motion_of(fitting, marker));
-            for (std::size_t a = 0; a < 3; ++a)
-                marker.offset_mm[a] += static_cast<float>(more[static_cast<Eigen::Index>(a)]);
-        }
-        const auto solved = solve_round(fitting, {});
-        if (!solved) return failure(solved.error());
-        out.final_rms_mm = solved->rms_mm;
-    }
-    out.layout = fitting.layout;
+    const auto last = solve_round(fitting, {});
+    if (!last) return failure(last.error());
+    out.final_rms_mm = last->rms_mm;
+    out.layout = fitting.now.layout;
     out.rig_scale = scale;
-    out.face_from_take = fitting.face_from_take;
+    out.face_from_take = fitting.now.face_from_take;
     for (LayoutMarker& marker : out.layout.markers) {
         for (std::size_t a = 0; a < 3; ++a) {
             marker.neutral_mm[a] = static_cast<float>(static_cast<double>(marker.neutral_mm[a]) * scale);
@@ -340,41 +385,18 @@ Result<LayoutFit, FileError> fit_layout(const Rig& rig, const MarkerLayout& roug
                     .motion = VertexMotion(rig),
                     .normals = vertex_normals(rig),
                     .parts = {},
-                    .layout = rough,
-                    .face_from_take = *landmarks,
-                    .solved = {},
-                    .moments = {},
-                    .marker_rms_mm = {},
-                    .noise_mm = options.noise_mm};
-    for (LayoutMarker& marker : fitting.layout.markers) {
+                    .now = {.layout = rough,
+                            .face_from_take = *landmarks,
+                            .solved = {},
+                            .moments = {},
+                            .marker_rms_mm = {},
+                            .noise_mm = options.noise_mm}};
+    for (LayoutMarker& marker : fitting.now.layout.markers) {
         marker.offset_mm = {};
         fitting.parts.push_back(parts_around(rig, marker));
     }
     LayoutFit out;
-    out.markers.resize(rough.markers.size());
-    for (std::size_t r = 0; r <= options.most_rounds && !out.converged; ++r) {
-        const auto tell = [&](double share) {
-            if (progress)
-                progress((static_cast<double>(r) + share) / static_cast<double>(options.most_rounds + 1),
-                         fmt::format("round {}", r));
-        };
-        tell(0.0);
-        std::size_t moved = 0;
-        if (r == 1) moved = project_markers(fitting);
-        if (r > 1) {
-            moved = choose_places(fitting);
-            align_again(fitting);
-        }
-        auto round = solve_round(fitting, tell);
-        if (!round) return failure(round.error());
-        round->moved = moved;
-        if (r == 0) {
-            for (std::size_t k = 0; k < out.markers.size(); ++k)
-                out.markers[k].given_mm = fitting.marker_rms_mm[k];
-        }
-        out.rounds.push_back(*round);
-        out.converged = r > 1 && round->change_mm < options.threshold_mm;
-    }
+    if (const auto ok = run_rounds(fitting, progress, out); !ok) return failure(ok.error());
     if (const auto ok = check_distance(fitting); !ok) return failure(ok.error());
     if (const auto ok = finish(fitting, rough, out); !ok) return failure(ok.error());
     return out;

@@ -3,9 +3,10 @@
 // any frame and scale.
 //
 //   round 0   landmarks -> Procrustes (R, t, scale); the layout as given is solved and judged
-//   round r   every marker: nearest triangle and barycentric coordinates in round 1; then, among the Q
-//   nearest
-//             triangles, the place with the lowest error over the take; similarity again; solve
+//   round 1   every marker: nearest triangle, barycentric coordinates of its neutral position; solve.
+//             If that made it worse, the neutral frames were not neutral: back to the layout as given.
+//   round r   every marker: among the Q nearest triangles, the place with the lowest error over the
+//             take; similarity again; solve
 //   end       when no marker's error changes by more than a threshold, or after the allowed rounds
 //
 // What is left of each marker's error, its mean vector over the take in the face frame, becomes the marker's
@@ -67,7 +68,8 @@ struct LayoutFit {
     Similarity face_from_take;     // of the rig as given
     std::vector<FitRound> rounds;  // [0]: the layout as given
     bool converged = false;
-    double final_rms_mm = 0.0;  // solved again with the offsets
+    bool projection_refused = false;  // round 1 was worse than the layout as given, which was kept instead
+    double final_rms_mm = 0.0;        // solved again with the offsets
     std::vector<FittedMarker> markers;
 };
 

@@ -1,13 +1,11 @@
 // How noisy a recorded marker coordinate is. Three estimates that mean different things:
 //
-//   hold         spread about the mean while the face holds still: all noise, slow noise too, and every
-//   tremor differences  fourth differences, by their median: white noise alone, from any take. A face that
-//   moves 10 mm
-//                at 2 Hz adds 0.02 mm to a fourth difference at 60 Hz, where a second difference has 0.44 and
-//                noise of 0.1 mm makes 0.84
-//   residual     what the solved model leaves, with its degrees of freedom taken off: noise, misplaced
-//   markers
-//                and everything the shapes cannot do. A residual well above the others asks for `headrig fit`
+// - hold: spread about the mean while the face holds still. All noise, slow noise too, and every tremor.
+// - differences: fourth differences, by their median. White noise alone, from any take: a face that moves
+//   10 mm at 2 Hz adds 0.02 mm to a fourth difference at 60 Hz (0.44 to a second one), noise of 0.1 mm
+//   makes 0.84 (0.24).
+// - residual: what the solved model leaves, with its degrees of freedom taken off. Noise, misplaced markers
+//   and everything the shapes cannot do; well above the others it asks for `headrig fit`.
 //
 // A pack's noise is the hold's where there is one, else the differences'.
 #pragma once
@@ -37,8 +35,8 @@ inline constexpr std::size_t kLeastNoiseSamples = 20;
 [[nodiscard]] CoordinateNoise noise_of_differences(const MarkerTake& take);
 
 // sqrt(sum of squared residuals / (coordinates seen - weights off their bounds)), over the frames that were
-// solved; nothing when no freedom is left. `take` is in the face frame up to slip; the slip takes no freedom: it
-// creeps from frame to frame, so the noise of one frame hardly moves it.
+// solved; nothing when no freedom is left. `take` is in the face frame up to slip; the slip takes no freedom:
+// it creeps from frame to frame, so the noise of one frame hardly moves it.
 [[nodiscard]] std::optional<double> noise_of_residual(const SolvePack& pack, const MarkerTake& take,
                                                       const SolvedTake& solved);
 

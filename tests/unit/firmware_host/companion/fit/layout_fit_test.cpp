@@ -44,6 +44,7 @@ TEST(LayoutFit, FindsThePlacesInAnyFrameAndScale) {
     const auto fit = fit_layout(scene.tiny.rig, scene.rough, scene.take, still_head());
     ASSERT_TRUE(fit) << fit.error().message;
     EXPECT_TRUE(fit->converged);
+    EXPECT_FALSE(fit->projection_refused);
     EXPECT_GT(fit->rounds.front().rms_mm, 1.2);  // 1.5 mm misplaced
     EXPECT_LT(fit->rounds.back().rms_mm, 0.25);
     EXPECT_LE(fit->final_rms_mm, fit->rounds.back().rms_mm + 1e-6);
@@ -82,6 +83,21 @@ TEST(LayoutFit, LeavesALayoutThatIsRightWhereItIs) {
     }
 }
 
+TEST(LayoutFit, NeutralFramesThatAreNotNeutralDoNotSpoilIt) {
+    FitSceneOptions scene_options;
+    scene_options.misplaced_mm = 0.5;
+    const FitScene scene = fit_scene(scene_options);
+    FitOptions options = still_head();
+    options.neutral_begin = 60;  // in the middle of the performance
+    options.neutral_end = 61;
+    const auto fit = fit_layout(scene.tiny.rig, scene.rough, scene.take, options);
+    ASSERT_TRUE(fit) << fit.error().message;
+    EXPECT_TRUE(fit->projection_refused);
+    EXPECT_GT(fit->rounds[1].rms_mm, fit->rounds[0].rms_mm);
+    EXPECT_LT(fit->rounds.back().rms_mm, 0.5 * fit->rounds[0].rms_mm);
+    EXPECT_LT(layout_distance_mm(unscaled(*fit), scene.tiny.layout), 0.4);
+}
+
 TEST(LayoutFit, OffsetsCarryWhatTheMeshCannot) {
     FitSceneOptions scene_options;
     const FitScene scene = fit_scene(scene_options);
@@ -98,7 +114,8 @@ TEST(LayoutFit, OffsetsCarryWhatTheMeshCannot) {
     const Float3& found = fit->layout.markers[4].offset_mm;
     const Vec3 offset(static_cast<double>(found[0]), static_cast<double>(found[1]),
                       static_cast<double>(found[2]));
-    EXPECT_NEAR(offset.dot(outward), 2.0, 0.2);
+    // One marker of thirty turns the alignment its way by its leverage, up to a fifth at the rim.
+    EXPECT_NEAR(offset.dot(outward), 2.0, 0.4);
     EXPECT_LT((offset - offset.dot(outward) * outward).norm(), 0.3);
     EXPECT_GT(fit->markers[4].rms_mm, 1.5);
     EXPECT_LT(fit->final_rms_mm, 0.6 * fit->rounds.back().rms_mm);
