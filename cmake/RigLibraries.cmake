@@ -12,3 +12,6 @@ find_program(FLATC flatc REQUIRED)
 if(RIG_BUILD_TESTS)
     find_package(GTest REQUIRED)
 endif()
+if(RIG_BUILD_BENCHES)
+    find_package(dlib 19.24 REQUIRED)  # to compare with, in tests/bench/solve
+endif()

@@ -18,6 +18,11 @@ constexpr double kReleaseShare =
     0.25;  // of the largest wrong multiplier; smaller ones wait for the next round
 constexpr std::size_t kReleaseAtOnce = 8;
 
+// Weights smaller than this are judged as if they were this large: in float, multipliers carry the rounding
+// of terms of about 1.
+template <typename Real>
+constexpr Real kLeastScale = sizeof(Real) == sizeof(float) ? Real(1) : Real(0.01);
+
 template <typename Real>
 bool finite(Real x) {
     return std::fabs(x) <= std::numeric_limits<Real>::max();
@@ -43,7 +48,6 @@ class FaceWalk {
 
     BoxQpReport run() {
         adopt_start();
-        refresh_gradient();
         while (report_.iterations < config_.iteration_cap) {
             ++report_.iterations;
             if (!step_descends()) {  // the inverse is worn out
@@ -62,11 +66,15 @@ class FaceWalk {
     [[nodiscard]] Real diagonal(std::size_t i) const { return p_.hessian[i * p_.stride + i]; }
 
     void adopt_start();
+    void set_where(std::size_t i, Where where);
+    void adopt_gradient();
+    void skip(std::size_t i) { ws_.may_rise[i] = ws_.may_fall[i] = Real(0); }
     [[nodiscard]] Where start_of(std::size_t i, bool same) const;
     void refresh_gradient();
     bool step_descends();
     [[nodiscard]] Real free_residual() const;
     bool walk();
+    [[nodiscard]] Real length_to_bound(std::size_t& blocking) const;
     bool next_face();
     bool release();
     std::size_t choose_candidates();
@@ -77,7 +85,6 @@ class FaceWalk {
     Real room_along(Real sign, std::size_t& blocking) const;
     void scale_tolerance();
     void certify();
-    [[nodiscard]] Real wanted_move(std::size_t i) const;
 
     const BoxQpProblem<Real>& p_;
     const BoxQpConfig& config_;
@@ -117,17 +124,44 @@ void FaceWalk<Real>::adopt_start() {
         s_.hessian_version = p_.hessian_version;
         s_.inverse_valid = false;
     }
+    const bool kept = same && s_.inverse_valid;
+    bool unmoved = kept;
     for (std::size_t i = 0; i < n; ++i) {
+        unmoved = unmoved && w_[i] == s_.answer[i];
         if (!finite(w_[i])) w_[i] = Real(0);
         w_[i] = std::clamp(w_[i], p_.low[i], p_.high[i]);
         const Where where = start_of(i, same);
         if (!same || (where == Where::kFree) != (s_.where[i] == Where::kFree)) s_.inverse_valid = false;
-        s_.where[i] = where;
-        ws_.skipped[i] = 0;
+        unmoved = unmoved && w_[i] == s_.answer[i];
+        set_where(i, where);
     }
     s_.warm = true;
     s_.size = static_cast<std::uint16_t>(n);
+    scale_tolerance();
     if (!s_.inverse_valid) rebuild();
+    free_.gather_values(w_);
+    if (unmoved && s_.inverse_valid) {
+        adopt_gradient();
+    } else {
+        refresh_gradient();
+    }
+}
+
+// At the last answer H w is known; its rounding is of no account, because every full step is followed by a
+// gradient made from nothing.
+template <typename Real>
+void FaceWalk<Real>::adopt_gradient() {
+    for (std::size_t i = 0; i < p_.size; ++i) ws_.gradient[i] = s_.product[i] + p_.linear[i];
+    free_.gather_gradient();
+    has_step_ = false;
+}
+
+template <typename Real>
+void FaceWalk<Real>::set_where(std::size_t i, Where where) {
+    const bool fixed = p_.low[i] == p_.high[i] || where == Where::kFree;
+    s_.where[i] = where;
+    ws_.may_rise[i] = !fixed && where != Where::kHigh ? Real(1) : Real(0);
+    ws_.may_fall[i] = !fixed && where != Where::kLow ? Real(1) : Real(0);
 }
 
 template <typename Real>
@@ -175,20 +209,18 @@ Real FaceWalk<Real>::free_residual() const {
 template <typename Real>
 bool FaceWalk<Real>::walk() {
     const std::size_t k = free_.count();
-    Real length(1);
+    int outside = 0;
+    for (std::size_t a = 0; a < k; ++a) {
+        const Real aim = ws_.value[a] - ws_.step[a];
+        outside |= static_cast<int>(!(aim >= ws_.free_low[a])) | static_cast<int>(!(aim <= ws_.free_high[a]));
+    }
     std::size_t blocking = kNone;
+    const Real length = outside != 0 ? length_to_bound(blocking) : Real(1);
     for (std::size_t a = 0; a < k; ++a) {
-        const std::size_t i = s_.free[a];
-        const Real d = -ws_.step[a];
-        const Real aim = w_[i] + length * d;
-        if (aim >= p_.low[i] && aim <= p_.high[i]) continue;
-        length = std::clamp(((d > Real(0) ? p_.high[i] : p_.low[i]) - w_[i]) / d, Real(0), length);
-        blocking = a;
+        const Real aim = ws_.value[a] - length * ws_.step[a];
+        ws_.value[a] = std::min(std::max(aim, ws_.free_low[a]), ws_.free_high[a]);
     }
-    for (std::size_t a = 0; a < k; ++a) {
-        const std::size_t i = s_.free[a];
-        w_[i] = std::clamp(w_[i] - length * ws_.step[a], p_.low[i], p_.high[i]);
-    }
+    for (std::size_t a = 0; a < k; ++a) w_[s_.free[a]] = ws_.value[a];
     fresh_ = false;
     moved_ = moved_ || length > Real(0);
     if (blocking == kNone) return true;
@@ -202,10 +234,25 @@ bool FaceWalk<Real>::walk() {
     return false;
 }
 
+// The share of the step after which the first variable, `blocking`, meets its bound.
+template <typename Real>
+Real FaceWalk<Real>::length_to_bound(std::size_t& blocking) const {
+    Real length(1);
+    for (std::size_t a = 0; a < free_.count(); ++a) {
+        const Real d = -ws_.step[a];
+        const Real aim = ws_.value[a] + length * d;
+        if (aim >= ws_.free_low[a] && aim <= ws_.free_high[a]) continue;
+        const Real room = (d > Real(0) ? ws_.free_high[a] : ws_.free_low[a]) - ws_.value[a];
+        length = std::clamp(room / d, Real(0), length);
+        blocking = a;
+    }
+    return length;
+}
+
 template <typename Real>
 void FaceWalk<Real>::fix(std::size_t slot, Where where) {
     const std::size_t i = s_.free[slot];
-    s_.where[i] = where;
+    set_where(i, where);
     w_[i] = where == Where::kLow ? p_.low[i] : p_.high[i];
     free_.remove(slot);
     last_residual_ = std::numeric_limits<Real>::infinity();
@@ -215,7 +262,6 @@ void FaceWalk<Real>::fix(std::size_t slot, Where where) {
 // After a full step: leaves the face where a multiplier has the wrong sign, sharpens its minimum, or is done.
 template <typename Real>
 bool FaceWalk<Real>::next_face() {
-    scale_tolerance();
     const Real residual = free_residual();
     const bool contracting = residual < Real(0.5) * last_residual_;
     last_residual_ = residual;
@@ -224,35 +270,33 @@ bool FaceWalk<Real>::next_face() {
             last_residual_ = std::numeric_limits<Real>::infinity();
             return true;
         }
-        if (residual <= tolerance_) return false;
+        if (residual <= tolerance_) {
+            const Real before = tolerance_;
+            scale_tolerance();
+            return tolerance_ < Real(0.5) * before;  // the weights have shrunk since: look closer
+        }
     }
     if (contracting) return true;
     last_residual_ = std::numeric_limits<Real>::infinity();
     return rebuild_once();
 }
 
-// How far variable i would move off its bound in a Jacobi step; not positive when the bound is right.
-template <typename Real>
-Real FaceWalk<Real>::wanted_move(std::size_t i) const {
-    const Real move = -ws_.gradient[i] * s_.scale[i];
-    if (s_.where[i] == Where::kFree || ws_.skipped[i] != 0 || p_.low[i] == p_.high[i]) return Real(0);
-    if (s_.where[i] == Where::kHeld) return std::fabs(move);
-    return s_.where[i] == Where::kLow ? move : -move;
-}
-
 // The variables to free next, the one that pulls most first. When the last round moved nothing, that one
 // only: it cannot be blocked at once, and so rounds do not repeat.
 template <typename Real>
 std::size_t FaceWalk<Real>::choose_candidates() {
+    for (std::size_t i = 0; i < p_.size; ++i) {  // how far a Jacobi step would take it off its bound
+        const Real move = ws_.gradient[i] * s_.scale[i];
+        const Real fall = move * ws_.may_fall[i];
+        const Real rise = -move * ws_.may_rise[i];
+        ws_.moving[i] = fall > rise ? fall : rise;
+    }
     Real largest(0);
     std::size_t best = kNone;
     for (std::size_t i = 0; i < p_.size; ++i) {
-        const Real move = wanted_move(i);
-        ws_.moving[i] = move;
-        if (move > largest) {
-            largest = move;
-            best = i;
-        }
+        if (!(ws_.moving[i] > largest)) continue;
+        largest = ws_.moving[i];
+        best = i;
     }
     if (!(largest > tolerance_)) return 0;
     std::size_t count = 0;
@@ -277,8 +321,8 @@ bool FaceWalk<Real>::release() {
         std::size_t added = 0;
         for (std::size_t c = 0; c < count; ++c) {
             const std::size_t i = ws_.candidates[c];
-            if (free_.add(i)) {
-                s_.where[i] = Where::kFree;
+            if (free_.add(i, w_[i])) {
+                set_where(i, Where::kFree);
                 ++report_.changes;
                 ++added;
             } else if (added == 0) {
@@ -306,7 +350,7 @@ void FaceWalk<Real>::rebuild() {
     ++report_.rebuilds;
     free_.clear();
     for (std::size_t i = 0; i < p_.size; ++i) {
-        if (s_.where[i] == Where::kFree && !free_.add(i)) s_.where[i] = Where::kHeld;
+        if (s_.where[i] == Where::kFree && !free_.add(i, w_[i])) set_where(i, Where::kHeld);
     }
     s_.inverse_valid = true;
     has_step_ = false;
@@ -344,38 +388,38 @@ bool FaceWalk<Real>::slide(std::size_t i) {
     const Real room = room_along(sign, blocking);
     const Real length = std::min({room, own, gain});
     if (!finite(length) || !(length >= Real(0))) {
-        ws_.skipped[i] = 1;
+        skip(i);
         return false;
     }
     const bool to_high = blocking != kNone && -sign * ws_.column[blocking] > Real(0);
     for (std::size_t a = 0; a < free_.count(); ++a) {
-        const std::size_t j = s_.free[a];
-        w_[j] = std::clamp(w_[j] - sign * length * ws_.column[a], p_.low[j], p_.high[j]);
+        const Real aim = ws_.value[a] - sign * length * ws_.column[a];
+        ws_.value[a] = std::clamp(aim, ws_.free_low[a], ws_.free_high[a]);
+        w_[s_.free[a]] = ws_.value[a];
     }
     w_[i] = std::clamp(w_[i] + sign * length, p_.low[i], p_.high[i]);
     moved_ = moved_ || length > Real(0);
-    if (length > Real(0)) s_.where[i] = Where::kHeld;
+    if (length > Real(0)) set_where(i, Where::kHeld);
+    bool stuck = false;
     if (length == room) {
         fix(blocking, to_high ? Where::kHigh : Where::kLow);
-        if (free_.add(i)) {
-            s_.where[i] = Where::kFree;
-            ++report_.changes;
-        } else {
-            ws_.skipped[i] = 1;
-        }
+        stuck = !free_.add(i, w_[i]);
+        if (!stuck) set_where(i, Where::kFree);
+        report_.changes = static_cast<std::uint16_t>(report_.changes + (stuck ? 0 : 1));
     } else if (length == own) {
-        s_.where[i] = sign > Real(0) ? Where::kHigh : Where::kLow;
+        set_where(i, sign > Real(0) ? Where::kHigh : Where::kLow);
         ++report_.changes;
     } else {
-        ws_.skipped[i] = 1;
+        stuck = true;
     }
+    if (stuck) skip(i);
     refresh_gradient();
     return true;
 }
 
 template <typename Real>
 void FaceWalk<Real>::scale_tolerance() {
-    Real largest(1);
+    Real largest = kLeastScale<Real>;
     for (std::size_t i = 0; i < p_.size; ++i) largest = std::max(largest, std::fabs(w_[i]));
     tolerance_ = static_cast<Real>(config_.tolerance) * largest;
 }
@@ -384,18 +428,29 @@ template <typename Real>
 void FaceWalk<Real>::certify() {
     if (!fresh_) refresh_gradient();
     scale_tolerance();
-    Real move(0);
-    bool sound = true;
-    double objective = 0.0;
-    for (std::size_t i = 0; i < p_.size; ++i) {
-        sound = sound && finite(ws_.gradient[i]) && finite(s_.scale[i]);
-        const Real target = std::clamp(w_[i] - ws_.gradient[i] * s_.scale[i], p_.low[i], p_.high[i]);
-        move = std::max(move, std::fabs(w_[i] - target));
-        objective += static_cast<double>(w_[i]) * static_cast<double>(ws_.gradient[i] + p_.linear[i]);
+    const std::size_t n = p_.size;
+    int sound = 1;
+    for (std::size_t i = 0; i < n; ++i) {
+        const Real target = std::min(std::max(w_[i] - ws_.gradient[i] * s_.scale[i], p_.low[i]), p_.high[i]);
+        const Real move = std::fabs(w_[i] - target);
+        sound &= static_cast<int>(std::fabs(ws_.gradient[i]) <= std::numeric_limits<Real>::max()) &
+                 static_cast<int>(move <= std::numeric_limits<Real>::max());
+        ws_.moving[i] = move;
+        s_.answer[i] = w_[i];
+        s_.product[i] = ws_.gradient[i] - p_.linear[i];
+        ws_.column[i] = ws_.gradient[i] + p_.linear[i];
     }
-    report_.kkt = sound ? static_cast<double>(move) : std::numeric_limits<double>::max();
-    report_.objective = sound ? 0.5 * objective : 0.0;
+    Real move(0);
+    for (std::size_t i = 0; i < n; ++i) move = ws_.moving[i] > move ? ws_.moving[i] : move;
+    std::array<double, 4> parts{};  // in double, four at a time: one sum would wait for itself
+    for (std::size_t i = 0; i < n; ++i) {
+        parts[i % 4] += static_cast<double>(w_[i]) * static_cast<double>(ws_.column[i]);
+    }
+    const double objective = 0.5 * ((parts[0] + parts[1]) + (parts[2] + parts[3]));
+    report_.kkt = sound != 0 ? static_cast<double>(move) : std::numeric_limits<double>::max();
+    report_.objective = sound != 0 ? objective : 0.0;
     report_.optimal = report_.kkt <= kAccepted * static_cast<double>(tolerance_);
+    if (sound == 0) s_.warm = false;  // nothing of this is worth keeping
 }
 
 template <typename Real>

@@ -39,7 +39,7 @@ struct BoxQpProblem {
 struct BoxQpConfig {
     std::uint16_t iteration_cap = 8 * kMaxUnknowns;
     // A point counts as optimal when a projected Jacobi step moves no variable by more than this, relative to
-    // the largest |w_i| or 1.
+    // the largest |w_i|, or to 1 (float) or 0.01 (double) when all are smaller.
     double tolerance = 1e-6;
 };
 
@@ -56,8 +56,10 @@ struct BoxQpState {
     std::uint16_t size = 0;        // N
     std::uint16_t free_count = 0;  // k
     std::array<Where, kMaxUnknowns> where{};
-    std::array<std::uint16_t, kMaxUnknowns> free{};      // [k], in the order of the inverse's rows
-    alignas(64) std::array<Real, kMaxUnknowns> scale{};  // 1 / H_ii
+    std::array<std::uint16_t, kMaxUnknowns> free{};        // [k], in the order of the inverse's rows
+    alignas(64) std::array<Real, kMaxUnknowns> answer{};   // w of the last solve
+    alignas(64) std::array<Real, kMaxUnknowns> product{};  // H answer
+    alignas(64) std::array<Real, kMaxUnknowns> scale{};    // 1 / H_ii
     alignas(64) std::array<Real, kMaxUnknowns * kInverseStride> inverse{};  // [k x k], zeros beyond
 };
 
@@ -66,12 +68,18 @@ struct BoxQpWorkspace {
     alignas(64) std::array<Real, kMaxUnknowns> gradient{};       // H w + q
     alignas(64) std::array<Real, kMaxUnknowns> free_gradient{};  // [k], as the inverse's rows
     alignas(64) std::array<Real, kMaxUnknowns> step{};           // [k] inverse free_gradient
+    // Of the free variables, in the order of the inverse's rows.
+    alignas(64) std::array<Real, kMaxUnknowns> value{};
+    alignas(64) std::array<Real, kMaxUnknowns> free_low{};
+    alignas(64) std::array<Real, kMaxUnknowns> free_high{};
+    // Of all: 1 where the variable may rise (fall) off the bound it sits at, else 0.
+    alignas(64) std::array<Real, kMaxUnknowns> may_rise{};
+    alignas(64) std::array<Real, kMaxUnknowns> may_fall{};
     alignas(64) std::array<Real, kMaxUnknowns> column{};
     alignas(64) std::array<Real, kMaxUnknowns> direction{};
-    std::array<Real, kMaxUnknowns> moving{};
+    alignas(64) std::array<Real, kMaxUnknowns> moving{};
     std::array<std::uint16_t, kMaxUnknowns> index{};
     std::array<std::uint16_t, kMaxUnknowns> candidates{};
-    std::array<std::uint8_t, kMaxUnknowns> skipped{};
 };
 
 struct BoxQpReport {

@@ -35,9 +35,9 @@ class FreeBlock {
                      ws_.step.data());
     }
 
-    // Puts variable i behind the others and carries the step along; gradient[i] is its part of the gradient.
-    // False, and column = inverse H_Fi, when its column depends on the free ones.
-    bool add(std::size_t i) {
+    // Puts variable i, now at w, behind the others and carries the step along; gradient[i] is its part of the
+    // gradient. False, and column = inverse H_Fi, when its column depends on the free ones.
+    bool add(std::size_t i, Real w) {
         const std::size_t k = count();
         const Real diagonal = p_.hessian[i * p_.stride + i];
         const Real rest = project_column(i);
@@ -60,6 +60,7 @@ class FreeBlock {
         ws_.step[k] = -pull * scale;
         ws_.free_gradient[k] = ws_.gradient[i];
         s_.free[k] = static_cast<std::uint16_t>(i);
+        place(k, i, w);
         ++s_.free_count;
         pad(s_.free_count);
         return true;
@@ -87,11 +88,17 @@ class FreeBlock {
             s_.free[slot] = s_.free[last];
             ws_.free_gradient[slot] = ws_.free_gradient[last];
             ws_.step[slot] = ws_.step[last];
+            place(slot, s_.free[last], ws_.value[last]);
         }
         for (std::size_t a = 0; a < k; ++a) row(a)[last] = Real(0);
         std::fill_n(row(last), padded(k), Real(0));
         s_.free_count = static_cast<std::uint16_t>(last);
         pad(last);
+    }
+
+    // The free variables' values and bounds beside each other.
+    void gather_values(std::span<const Real> w) {
+        for (std::size_t a = 0; a < count(); ++a) place(a, s_.free[a], w[s_.free[a]]);
     }
 
     void gather_gradient() {
@@ -103,6 +110,12 @@ class FreeBlock {
     static constexpr std::size_t kStride = BoxQpState<Real>::kInverseStride;
 
     [[nodiscard]] Real* row(std::size_t a) { return s_.inverse.data() + a * kStride; }
+
+    void place(std::size_t slot, std::size_t i, Real w) {
+        ws_.value[slot] = w;
+        ws_.free_low[slot] = p_.low[i];
+        ws_.free_high[slot] = p_.high[i];
+    }
 
     // Zeros behind the k entries of what the kernels read in whole lanes.
     void pad(std::size_t k) {
