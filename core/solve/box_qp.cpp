@@ -357,12 +357,14 @@ void FaceWalk<Real>::rebuild() {
 }
 
 // How far w may go along sign (e_i - column) before a bound; `blocking` the slot that meets it, or kNone.
+// Negative when the column is no number.
 template <typename Real>
 Real FaceWalk<Real>::room_along(Real sign, std::size_t& blocking) const {
     Real length = std::numeric_limits<Real>::infinity();
     blocking = kNone;
     for (std::size_t a = 0; a < free_.count(); ++a) {
         const Real d = -sign * ws_.column[a];
+        if (!finite(d)) return Real(-1);
         if (std::fabs(d) < tolerance_) continue;
         const std::size_t j = s_.free[a];
         const Real room = ((d > Real(0) ? p_.high[j] : p_.low[j]) - w_[j]) / d;

@@ -334,60 +334,6 @@ TYPED_TEST(BoxQp, StepOfNoLengthStopsEverybody) {
     EXPECT_NEAR(found.w[2], 0.5, 1e-6);
 }
 
-// Markers come and go: the kept inverse follows by rank-one terms and the answer stays the cold one.
-TYPED_TEST(BoxQp, FollowsTheHessianThroughRankOneTerms) {
-    test::SeededRandom random(108);
-    const auto workspace = std::make_unique<BoxQpWorkspace<TypeParam>>();
-    const auto state = std::make_unique<BoxQpState<TypeParam>>();
-    for (int i = 0; i < 40; ++i) {
-        const std::size_t n = 5 + random.below(50);
-        Problem p = random_problem(n, 3 * n, 0.5, random);
-        const std::size_t stride = row_stride(n);
-        std::vector<TypeParam> h(n * stride);
-        const auto in = [](const std::vector<double>& v) {
-            return std::vector<TypeParam>(v.begin(), v.end());
-        };
-        for (std::size_t r = 0; r < n; ++r) {
-            for (std::size_t c = 0; c < n; ++c)
-                h[r * stride + c] = static_cast<TypeParam>(p.hessian[r * kStride + c]);
-        }
-        const std::vector<TypeParam> q = in(p.linear), low = in(p.low), high = in(p.high);
-        std::vector<TypeParam> w(n);
-        std::uint32_t version = 1;
-        state->warm = false;
-        BoxQpReport report;
-        std::vector<std::vector<TypeParam>> terms;
-        for (int step = 0; step < 30; ++step) {
-            report = solve_box_qp({n, stride, h, q, low, high, version}, this->tight(), *state, *workspace,
-                                  std::span<TypeParam>(w));
-            ASSERT_TRUE(report.optimal);
-            ASSERT_EQ(report.rebuilds, step == 0 ? 1 : 0) << "the inverse followed";
-            const bool add = terms.empty() || random.chance(0.5);
-            if (add) {
-                terms.emplace_back(padded(n));
-                for (std::size_t c = 0; c < n; ++c)
-                    terms.back()[c] = static_cast<TypeParam>(random.normal(0.0, 0.5));
-            }
-            const std::vector<TypeParam> z = terms.back();
-            if (add) add_square(h.data(), stride, n, z.data());
-            if (!add) subtract_square(h.data(), stride, n, z.data());
-            if (!add) terms.pop_back();
-            ASSERT_TRUE(follow_hessian(*state, std::span<const TypeParam>(z.data(), n), add));
-            settle_hessian(*state, std::span<const TypeParam>(h), stride, ++version);
-        }
-        for (std::size_t r = 0; r < n; ++r) {
-            for (std::size_t c = 0; c < n; ++c)
-                p.hessian[r * kStride + c] = static_cast<double>(h[r * stride + c]);
-        }
-        report = solve_box_qp({n, stride, h, q, low, high, version}, this->tight(), *state, *workspace,
-                              std::span<TypeParam>(w));
-        const auto cold = this->solve_cold(p);
-        for (std::size_t k = 0; k < n; ++k) {
-            ASSERT_NEAR(static_cast<double>(w[k]), cold.w[k], this->kWeight) << "case " << i;
-        }
-    }
-}
-
 TYPED_TEST(BoxQp, EmptyProblem) {
     const auto found = this->solve_cold(Problem(0));
     EXPECT_TRUE(found.report.optimal);
