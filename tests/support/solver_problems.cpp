@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/base/math.hpp"
 #include "tests/support/random.hpp"
 
 namespace rig::test {
@@ -35,7 +36,7 @@ std::vector<double> column_of(const Bump& bump, const std::vector<std::array<dou
     for (const auto& at : cloud) {
         const double dx = at[0] - bump.x;
         const double dy = at[1] - bump.y;
-        const double height = std::exp(-(dx * dx + dy * dy) / (bump.radius * bump.radius));
+        const double height = rig::exp(-(dx * dx + dy * dy) / (bump.radius * bump.radius));
         for (const double d : bump.direction) column.push_back(d * height);
     }
     return column;
@@ -90,7 +91,7 @@ void make_performance(SolverTrajectory& problem, std::size_t frames, SeededRando
     std::vector<std::size_t> ends;
     for (std::size_t f = 0; f < frames; ++f) {
         std::erase_if(ends, [f](std::size_t end) { return end <= f; });
-        const double wave = std::sin(static_cast<double>(f) * 2.0 * std::numbers::pi / 500.0);
+        const double wave = sin_cos(static_cast<double>(f) * 2.0 * std::numbers::pi / 500.0).sin;
         const auto wanted = static_cast<std::size_t>(12.5 + 7.5 * wave);
         while (ends.size() < wanted) {
             const std::size_t shape = random.below(problem.shapes);
@@ -100,7 +101,7 @@ void make_performance(SolverTrajectory& problem, std::size_t frames, SeededRando
                 const double phase =
                     2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(length);
                 double& w = problem.weights[f + k][shape];
-                w = std::min(1.0, w + 0.5 * height * (1.0 - std::cos(phase)));
+                w = std::min(1.0, w + 0.5 * height * (1.0 - sin_cos(phase).cos));
             }
             ends.push_back(f + length);
         }
