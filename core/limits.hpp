@@ -7,10 +7,11 @@
 
 namespace rig {
 
-inline constexpr std::size_t kMaxCameras = 4;    // a helmet carries one to four
-inline constexpr std::size_t kMaxMarkers = 128;  // the densest published layout has 102
-inline constexpr std::size_t kMinMarkers = 4;    // fewer do not fix a rigid motion
-inline constexpr std::size_t kMaxShapes = 256;   // artists' rigs reach 200 to 250
+inline constexpr std::size_t kMaxCameras = 4;     // a helmet carries one to four
+inline constexpr std::size_t kMaxMarkers = 128;   // the densest published layout has 102
+inline constexpr std::size_t kMinMarkers = 4;     // fewer do not fix a rigid motion
+inline constexpr std::size_t kMaxShapes = 256;    // artists' rigs reach 200 to 250
+inline constexpr std::size_t kMaxUnknowns = 288;  // of one quadratic problem: every shape, and head room
 inline constexpr std::size_t kMaxRows = 3 * kMaxMarkers;
 inline constexpr std::size_t kMaxObservations = 256;  // per camera and frame: every marker twice
 inline constexpr std::size_t kMaxPoints = 256;        // unlabelled 3D points of one frame: every marker twice
@@ -44,6 +45,7 @@ static_assert(4 * (kMaxRows * kMaxShapes + kMaxRbfDimensions * kMaxRows + kMaxRb
                    kMaxRbfCentres * kMaxShapes) <=
               kMaxPackBytes / 2);
 static_assert(kMaxModes <= kMaxShapes);
+static_assert(kMaxShapes <= kMaxUnknowns);
 static_assert(kMaxDotDiameterPx + 16 <= kBlobWindowPx);
 static_assert(kMaxCandidates >= kMaxObservations);
 static_assert(kMaxImageWidth % kBlockPx == 0 && kMaxImageHeight % kBlockPx == 0);

@@ -310,7 +310,8 @@ void Pipeline::hold(std::int64_t capture_us, FaceState& state) {
     if (ladder_.state <= TrackingState::kHold) reset_recovery(recovery_);
     if (!ladder_.ever_usable || ladder_.state != TrackingState::kLost) return;
     if (config_.loss_policy != LossPolicy::kDecay) return;
-    const std::int64_t since_us = elapsed_us(last_usable_us_, capture_us) - ladder_config_.lost_after_us;
+    const std::int64_t since_us =
+        elapsed_us(ladder_config_.lost_after_us, elapsed_us(last_usable_us_, capture_us));
     const double left =
         1.0 - std::clamp(static_cast<double>(since_us) / static_cast<double>(kDecayUs), 0.0, 1.0);
     for (std::size_t i = 0; i < pack_.shape_count; ++i) {
