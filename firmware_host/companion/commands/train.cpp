@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,8 @@
 #include "firmware_host/companion/train/camera_file.hpp"
 #include "firmware_host/companion/train/pack_writer.hpp"
 #include "firmware_host/companion/train/train.hpp"
+#include "firmware_host/companion/train/training_record.hpp"
+#include "firmware_host/pack_file/opened_pack.hpp"
 
 namespace rig::host {
 
@@ -81,18 +84,34 @@ void print_result(const TrainCommand& command, const TrainedPack& pack) {
         coverage.widths[2], coverage.widths[3], coverage.distance_mm[1], coverage.spread_mm);
 }
 
-// The page with everything that is known now and not in the pack.
-Result<void, FileError> write_report(const TrainCommand& command, const TrainedPack& pack) {
+// Of the pack that has just been written; nothing for a pack without a regression.
+Result<std::optional<TrainingRecord>, FileError> record_of(const TrainCommand& command,
+                                                           const TrainedPack& pack) {
+    if (!pack.report.rbf) return std::nullopt;
+    const auto opened = open_pack_file(command.out);
+    if (!opened) return failure(FileError{opened.error().message});
+    return TrainingRecord{.pack_uuid = uuid_text(opened->manifest()),
+                          .rbf = *pack.report.rbf,
+                          .coverage = pack.report.coverage.value_or(Coverage{}),
+                          .shape_names = pack.shape_names};
+}
+
+// What training knows and the pack does not hold: the curves beside it, and the page when it is asked for.
+Result<void, FileError> write_reports(const TrainCommand& command, const TrainedPack& pack) {
+    auto record = record_of(command, pack);
+    if (!record) return failure(record.error());
+    if (*record) {
+        const auto saved =
+            write_whole_text(training_record_path(command.out), training_record_text(**record));
+        if (!saved) return saved;
+    }
+    if (command.report.empty()) return {};
     const SolvePack view = pack.view();
     const Take* take = command.options.takes.empty() ? nullptr : &command.options.takes.front();
     const auto analysis = analyse_pack(view, take);
     if (!analysis) return failure(analysis.error());
-    const PackPageInput input{.name = command.identity.name,
-                              .pack = view,
-                              .analysis = *analysis,
-                              .rbf = pack.report.rbf,
-                              .coverage = pack.report.coverage,
-                              .curves = {}};
+    const PackPageInput input{
+        .name = command.identity.name, .pack = view, .analysis = *analysis, .training = std::move(*record)};
     return write_whole_text(command.report, pack_page(input));
 }
 
@@ -229,11 +248,9 @@ int run_train(TrainCommand& command) {
         print_error(saved.error().message);
         return kExitOutput;
     }
-    if (!command.report.empty()) {
-        if (const auto written = write_report(command, *pack); !written) {
-            print_error(written.error().message);
-            return kExitOutput;
-        }
+    if (const auto written = write_reports(command, *pack); !written) {
+        print_error(written.error().message);
+        return kExitOutput;
     }
     print_result(command, *pack);
     if (!command.markers.empty()) print_residual(*pack, markers);

@@ -1,13 +1,11 @@
 #include "firmware_host/companion/experiments/barycentric_fit.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
 #include "firmware_host/companion/rig_folder/surface.hpp"
+#include "firmware_host/companion/train/white_noise.hpp"
 
 namespace rig::host {
 
@@ -17,33 +15,12 @@ constexpr std::size_t kNeutralFrames = 30;
 constexpr double kNoiseMm = 0.1;
 constexpr double kTakeScale = 1.06;  // the take's millimetres to one of the rig
 
-// SplitMix64 (Steele, Lea, Flood 2014), and the sum of twelve uniforms for a normal.
-class Dice {
-  public:
-    explicit Dice(std::uint64_t seed) : state_(seed) {}
-    double uniform() {
-        state_ += 0x9e3779b97f4a7c15ULL;
-        std::uint64_t z = state_;
-        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-        z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-        return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
-    }
-    double normal() {
-        double sum = -6.0;
-        for (int i = 0; i < 12; ++i) sum += uniform();
-        return sum;
-    }
-
-  private:
-    std::uint64_t state_;
-};
-
 Vec3 vector(const Float3& v) {
     return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
 }
 
 // Every marker moved along the skin by `far_mm`, in a direction of its own, and set on the mesh there.
-MarkerLayout misplaced(const Rig& rig, const MarkerLayout& layout, double far_mm, Dice& dice) {
+MarkerLayout misplaced(const Rig& rig, const MarkerLayout& layout, double far_mm, WhiteNoise& dice) {
     const std::vector<Double3> normals = vertex_normals(rig);
     MarkerLayout out = layout;
     for (LayoutMarker& marker : out.markers) {
@@ -63,7 +40,7 @@ MarkerLayout misplaced(const Rig& rig, const MarkerLayout& layout, double far_mm
 
 // Neutral frames, then the performance, as cameras in another frame and scale would have recorded it.
 MarkerTake recorded(const Rig& rig, const MarkerLayout& truth, const Take& take,
-                    const Similarity& take_from_face, Dice& dice) {
+                    const Similarity& take_from_face, WhiteNoise& dice) {
     const MarkerModel model = marker_model(rig, truth);
     const std::size_t n = rig.shapes.size();
     MarkerTake out{.frame_count = kNeutralFrames + take.frame_count,
@@ -74,7 +51,7 @@ MarkerTake recorded(const Rig& rig, const MarkerLayout& truth, const Take& take,
         for (std::size_t k = 0; k < out.marker_count; ++k) {
             Vec3 p;
             for (std::size_t a = 0; a < 3; ++a) {
-                double x = static_cast<double>(model.neutral_mm[3 * k + a]) + kNoiseMm * dice.normal();
+                double x = static_cast<double>(model.neutral_mm[3 * k + a]) + kNoiseMm * dice.next();
                 for (std::size_t i = 0; i < n && f >= kNeutralFrames; ++i) {
                     x += static_cast<double>(model.basis_mm[(3 * k + a) * n + i]) *
                          static_cast<double>(take.weights[(f - kNeutralFrames) * n + i]);
@@ -106,7 +83,7 @@ Result<BarycentricFigures, FileError> measure_barycentric(const std::filesystem:
     if (!truth) return failure(truth.error());
     const auto take = load_take(data / "takes" / "alex_rom_3_weights60.csv", *rig);
     if (!take) return failure(take.error());
-    Dice dice(which.seed);
+    WhiteNoise dice(which.seed);
     const MarkerLayout rough = misplaced(*rig, *truth, which.misplaced_mm, dice);
     Similarity take_from_face;
     take_from_face.scale = kTakeScale;
@@ -129,41 +106,6 @@ Result<BarycentricFigures, FileError> measure_barycentric(const std::filesystem:
     out.scale_error = fit->rig_scale / kTakeScale - 1.0;
     out.history = fit->rounds;
     return out;
-}
-
-Result<bool, FileError> run_barycentric_fit(const std::filesystem::path& data) {
-    fmt::print(
-        "Marker-to-mesh initialisation [Hybrid16 section 6]: range-of-motion take, 60 markers, 0.1 mm "
-        "noise.\n"
-        "The take is exactly linear in the head's shapes, which flatters the solver. Source: 3-4 rounds.\n"
-        "{:<9} {:>9} {:>4} | {:>9} {:>9} {:>9} {:>6} | {:>9} {:>9} {:>9}\n",
-        "placement", "misplaced", "seed", "given mm", "found mm", "offset mm", "rounds", "place mm",
-        "found mm", "scale");
-    bool hold = true;
-    for (const Placement placement : {Placement::kTake, Placement::kNeutral}) {
-        for (const double far_mm : {1.0, 3.0}) {
-            for (const std::uint64_t seed : {1U, 2U, 3U}) {
-                const auto figures = measure_barycentric(data, {far_mm, seed, placement});
-                if (!figures) return failure(figures.error());
-                fmt::print(
-                    "{:<9} {:>6} mm {:>4} | {:>9.3f} {:>9.3f} {:>9.3f} {:>6} | {:>9.3f} {:>9.3f} {:>8.3f}%\n",
-                    placement == Placement::kTake ? "take" : "neutral", far_mm, seed, figures->given_mm,
-                    figures->fitted_mm, figures->final_mm, figures->rounds, figures->place_given_mm,
-                    figures->place_fitted_mm, 100.0 * figures->scale_error);
-                std::string rounds;
-                for (const FitRound& round : figures->history) rounds += fmt::format(" {:.3f}", round.rms_mm);
-                fmt::print("    by round:{}\n", rounds);
-                std::fflush(stdout);
-                hold =
-                    hold &&
-                    (far_mm > 1.0 || placement != Placement::kTake ||
-                     (figures->fitted_mm <= kBarycentricMostMm && figures->rounds <= kBarycentricMostRounds));
-            }
-        }
-    }
-    fmt::print("bound at 1 mm, placement by the take: error <= {} mm in <= {} rounds: {}\n",
-               kBarycentricMostMm, kBarycentricMostRounds, hold ? "holds" : "does NOT hold");
-    return hold;
 }
 
 }  // namespace rig::host

@@ -1,4 +1,5 @@
-// Experiment "barycentric": marker-to-mesh initialisation over a range-of-motion take [Hybrid16 section 6].
+// One case of the experiment "hybrid16-barycentric": marker-to-mesh initialisation over a range-of-motion take
+// [Hybrid16 section 6].
 //
 // The true places are the head's layout of 60 markers; the layout as given has every marker moved 1 or 3 mm
 // along the skin, each in a direction of its own. The take is the recorded performance on the true places
@@ -31,15 +32,8 @@ struct BarycentricFigures {
     std::vector<FitRound> history;
 };
 
-// The bounds at 1 mm.
-inline constexpr double kBarycentricMostMm = 0.25;
-inline constexpr std::size_t kBarycentricMostRounds = 5;
-
 // `data` is the folder with rig/ and takes/.
 [[nodiscard]] Result<BarycentricFigures, FileError> measure_barycentric(const std::filesystem::path& data,
                                                                         const BarycentricCase& which);
-
-// Prints the table; true when the bounds hold in every case of 1 mm.
-[[nodiscard]] Result<bool, FileError> run_barycentric_fit(const std::filesystem::path& data);
 
 }  // namespace rig::host

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "firmware_host/companion/report/page.hpp"
+#include "firmware_host/companion/report/training_charts.hpp"
 
 namespace rig::host {
 
@@ -144,11 +145,14 @@ void regions(const PackPageInput& input, Page& page) {
 }
 
 void coverage_table(const Coverage& coverage, Page& page) {
+    page.heading("Coverage");
     page.paragraph(fmt::format(
-        "Coverage: {:.1f} % of {} frames within one width of a reference, {:.1f} % beyond three, where the "
-        "regression "
-        "falls back to its offset. Spread of the frames: {:.2f} mm.",
-        100.0 * coverage.covered_share, coverage.frames, 100.0 * coverage.lost_share, coverage.spread_mm));
+        "How near the {} frames come to the references: {:.1f} % lie within one width of one, {:.1f} % "
+        "beyond "
+        "three, where the regression has nothing to go by. The frames spread {:.2f} mm (rms from their "
+        "mean), "
+        "which the distances in mm are to be held against.",
+        coverage.frames, 100.0 * coverage.covered_share, 100.0 * coverage.lost_share, coverage.spread_mm));
     std::vector<Page::Row> rows;
     for (std::size_t q = 0; q < kCoverageQuantiles.size(); ++q) {
         rows.push_back(
@@ -156,40 +160,54 @@ void coverage_table(const Coverage& coverage, Page& page) {
               fmt::format("{:.2f}", coverage.widths[q]), fmt::format("{:.2f}", coverage.distance_mm[q])},
              false});
     }
-    page.table({"of the frames at most", "widths", "mm"}, rows);
+    page.table({"of the frames", "within widths", "within mm"}, rows);
 }
 
-void regression(const PackPageInput& input, Page& page) {
-    const RbfModel& rbf = input.pack.rbf;
-    if (input.pack.solver != SolverKind::kRbf) return;
-    page.heading("RBF regression");
-    page.paragraph(
-        fmt::format("{} references in {} principal components.", rbf.centre_count, rbf.dimension_count));
-    if (input.rbf) {
-        page.paragraph(fmt::format(
-            "Trained on {} frames: {:.2f} % of the variance kept, width {} x local spacing, median ridge "
-            "{:.3g}; "
-            "weight rms {:.4f} in the take ({:.4f} over visible shapes), {:.4f} on blocks left out.",
-            input.rbf->frames, 100.0 * input.rbf->variance_kept, input.rbf->width_factor,
-            input.rbf->median_lambda, input.rbf->in_take_rms, input.rbf->visible_in_take_rms,
-            input.rbf->cross_validated_rms));
-    }
+void widths_chart(const RbfModel& rbf, Page& page) {
     std::vector<double> widths(rbf.widths_mm.begin(), rbf.widths_mm.end());
     std::ranges::sort(widths);
-    LineChart chart{.x_name = "reference, by width",
+    LineChart chart{.x_name = "reference, narrowest first",
                     .y_name = "width, mm",
-                    .log_x = false,
-                    .log_y = false,
                     .dots = false,
                     .series = {{"width", {}}},
                     .marked_x = std::nullopt};
     for (std::size_t k = 0; k < widths.size(); ++k)
         chart.series[0].points.push_back({static_cast<double>(k + 1), widths[k]});
-    page.figure(line_chart(chart), "Widths of the references.");
-    if (input.coverage) coverage_table(*input.coverage, page);
-    if (input.analysis.take && input.analysis.take->coverage && !input.coverage)
+    page.figure(line_chart(chart), "Widths of the references, in the space of the principal components.");
+}
+
+void regression(const PackPageInput& input, Page& page) {
+    const RbfModel& rbf = input.pack.rbf;
+    page.heading("Cross-validation and GCV");
+    if (input.pack.solver != SolverKind::kRbf) {
+        page.paragraph(
+            "Nothing of this pack was chosen by cross-validation: its prior, noise, sparsity and ridge are "
+            "given "
+            "or measured, and every frame is solved from them. A regression (--solver rbf) has these "
+            "curves.");
+        return;
+    }
+    page.paragraph(
+        fmt::format("{} references in {} principal components.", rbf.centre_count, rbf.dimension_count));
+    if (input.training) {
+        const RbfTrainingReport& training = input.training->rbf;
+        page.paragraph(fmt::format(
+            "Trained on {} frames: {:.2f} % of the variance kept, width {:.3g} x local spacing, median ridge "
+            "{:.3g}. Weight rms {:.4f} in the take ({:.4f} over visible shapes), {:.4f} on blocks left out.",
+            training.frames, 100.0 * training.variance_kept, training.width_factor, training.median_lambda,
+            training.in_take_rms, training.visible_in_take_rms, training.cross_validated_rms));
+        for (const TrainingCurve& curve : training_curves(training))
+            page.figure(line_chart(curve.chart), curve.title);
+    } else {
+        page.paragraph(
+            "The curves of the training are not in a pack. `headrig train` writes them beside it, as NAME"
+            ".training.csv; with that file in the pack's folder they stand here.");
+    }
+    widths_chart(rbf, page);
+    if (input.training)
+        coverage_table(input.training->coverage, page);
+    else if (input.analysis.take && input.analysis.take->coverage)
         coverage_table(*input.analysis.take->coverage, page);
-    for (const TrainingCurve& curve : input.curves) page.figure(line_chart(curve.chart), curve.title);
 }
 
 }  // namespace

@@ -18,7 +18,10 @@ constexpr double kLeftPx = 70.0;
 constexpr double kRightPx = 20.0;
 constexpr double kTopPx = 14.0;
 constexpr double kBottomPx = 48.0;
-constexpr std::array kColours{"#1f5fa8", "#b3541e", "#2e7d4f", "#7a4fa3", "#8a6d1d", "#555555"};
+// Text, axes and grid take the page's own colour; these are told from white and from near black.
+constexpr std::array kColours{"#3b82c4", "#d9773f", "#3f9e6b", "#9a6fc4", "#b8952b", "#8a8a8a"};
+constexpr std::string_view kAxis = "stroke=\"currentColor\" stroke-opacity=\"0.7\"";
+constexpr std::string_view kGrid = "stroke=\"currentColor\" stroke-opacity=\"0.15\"";
 
 std::string open_svg(double width, double height, std::string_view label) {
     return fmt::format(
@@ -29,8 +32,8 @@ std::string open_svg(double width, double height, std::string_view label) {
 }
 
 std::string text_at(double x, double y, std::string_view anchor, std::string_view text) {
-    return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"#333\">{}</text>\n", x, y,
-                       anchor, escaped(text));
+    return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"currentColor\">{}</text>\n",
+                       x, y, anchor, escaped(text));
 }
 
 std::string line_between(double x0, double y0, double x1, double y1, std::string_view style) {
@@ -93,38 +96,48 @@ std::string draw_axes(const Frame& frame, const LineChart& chart) {
     std::string out;
     const double bottom = kHeightPx - kBottomPx;
     for (const double tick : axis_ticks(frame.y.low, frame.y.high, frame.y.logarithmic)) {
-        out +=
-            line_between(kLeftPx, frame.y_px(tick), kWidthPx - kRightPx, frame.y_px(tick), "stroke=\"#ddd\"");
+        out += line_between(kLeftPx, frame.y_px(tick), kWidthPx - kRightPx, frame.y_px(tick), kGrid);
         out += text_at(kLeftPx - 6.0, frame.y_px(tick) + 4.0, "end", fmt::format("{:.4g}", tick));
     }
     for (const double tick : axis_ticks(frame.x.low, frame.x.high, frame.x.logarithmic)) {
-        out += line_between(frame.x_px(tick), bottom, frame.x_px(tick), bottom + 4.0, "stroke=\"#555\"");
+        out += line_between(frame.x_px(tick), bottom, frame.x_px(tick), bottom + 4.0, kAxis);
         out += text_at(frame.x_px(tick), bottom + 16.0, "middle", fmt::format("{:.4g}", tick));
     }
-    out += line_between(kLeftPx, bottom, kWidthPx - kRightPx, bottom, "stroke=\"#555\"");
-    out += line_between(kLeftPx, kTopPx, kLeftPx, bottom, "stroke=\"#555\"");
+    out += line_between(kLeftPx, bottom, kWidthPx - kRightPx, bottom, kAxis);
+    out += line_between(kLeftPx, kTopPx, kLeftPx, bottom, kAxis);
     out += text_at(0.5 * (kLeftPx + kWidthPx - kRightPx), kHeightPx - 14.0, "middle", chart.x_name);
     out += fmt::format(
         "<text transform=\"translate(14 {:.1f}) rotate(-90)\" text-anchor=\"middle\" "
-        "fill=\"#333\">{}</text>\n",
+        "fill=\"currentColor\">{}</text>\n",
         0.5 * (kTopPx + bottom), escaped(chart.y_name));
     return out;
 }
 
-std::string draw_series(const Frame& frame, const ChartSeries& series, const char* colour, bool dots) {
+struct Pen {
+    const char* colour;
+    double width = 1.6;
+    double opacity = 1.0;
+};
+
+std::string draw_series(const Frame& frame, const ChartSeries& series, const Pen& pen,
+                        const LineChart& chart) {
     std::string path;
-    std::string marks;
+    std::vector<std::string> marks;
     for (const ChartPoint& point : series.points) {
         if (!frame.x.shows(point.x) || !frame.y.shows(point.y)) continue;
         path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : " L", frame.x_px(point.x),
                             frame.y_px(point.y));
-        if (dots)
-            marks += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.2\" fill=\"{}\"/>\n",
-                                 frame.x_px(point.x), frame.y_px(point.y), colour);
+        marks.push_back(fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.2\" fill=\"{}\"/>\n",
+                                    frame.x_px(point.x), frame.y_px(point.y), pen.colour));
     }
     if (path.empty()) return {};
-    return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>\n", path, colour) +
-           marks;
+    std::string out = fmt::format(
+        "<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" stroke-opacity=\"{}\"/>\n", path,
+        pen.colour, pen.width, pen.opacity);
+    for (std::size_t i = chart.ends ? marks.size() - 1 : 0; i < marks.size() && (chart.dots || chart.ends);
+         ++i)
+        out += marks[i];
+    return out;
 }
 
 double greatest(const std::vector<ChartBar>& bars) {
@@ -137,12 +150,12 @@ double greatest(const std::vector<ChartBar>& bars) {
     return out > 0.0 ? out : 1.0;
 }
 
-// From pale to dark blue, 0..1.
+// From pale blue to red, 0..1: seen on white and on near black.
 std::string shade(double share) {
     const auto mix = [share](double from, double to) {
         return static_cast<int>(std::lround(from + share * (to - from)));
     };
-    return fmt::format("#{:02x}{:02x}{:02x}", mix(214, 13), mix(230, 52), mix(244, 110));
+    return fmt::format("#{:02x}{:02x}{:02x}", mix(150, 205), mix(190, 60), mix(220, 45));
 }
 
 }  // namespace
@@ -189,15 +202,17 @@ std::string line_chart(const LineChart& chart) {
     out += draw_axes(frame, chart);
     if (chart.marked_x && frame.x.shows(*chart.marked_x)) {
         out += line_between(frame.x_px(*chart.marked_x), kTopPx, frame.x_px(*chart.marked_x),
-                            kHeightPx - kBottomPx, "stroke=\"#888\" stroke-dasharray=\"4 3\"");
+                            kHeightPx - kBottomPx,
+                            "stroke=\"currentColor\" stroke-opacity=\"0.6\" stroke-dasharray=\"4 3\"");
     }
+    const bool crowd = chart.series.size() > kColours.size();
     for (std::size_t s = 0; s < chart.series.size(); ++s) {
-        const char* colour = kColours[s % kColours.size()];
-        out += draw_series(frame, chart.series[s], colour, chart.dots);
-        if (chart.series.size() < 2) continue;
+        const Pen pen = crowd ? Pen{kColours[0], 1.0, 0.5} : Pen{kColours[s]};
+        out += draw_series(frame, chart.series[s], pen, chart);
+        if (chart.series.size() < 2 || crowd) continue;
         const double y = kTopPx + 12.0 + 15.0 * static_cast<double>(s);
         out += line_between(kWidthPx - 190.0, y - 4.0, kWidthPx - 172.0, y - 4.0,
-                            fmt::format("stroke=\"{}\" stroke-width=\"2\"", colour));
+                            fmt::format("stroke=\"{}\" stroke-width=\"2\"", pen.colour));
         out += text_at(kWidthPx - 166.0, y, "start", chart.series[s].name);
     }
     return out + "</svg>\n";
@@ -217,10 +232,10 @@ std::string bar_chart(const std::vector<ChartBar>& bars, const std::string& unit
         double end = kNamePx + value * scale;
         out += text_at(kNamePx - 8.0, y + 11.0, "end", bar.name);
         out += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"11\" fill=\"{}\"/>\n",
-                           kNamePx, y + 1.0, value * scale, bar.flagged ? "#d98b4b" : "#6f9fd0");
+                           kNamePx, y + 1.0, value * scale, bar.flagged ? kColours[1] : kColours[0]);
         if (bar.second && std::isfinite(*bar.second)) {
             const double at = kNamePx + std::max(0.0, *bar.second) * scale;
-            out += line_between(at, y, at, y + 13.0, "stroke=\"#222\" stroke-width=\"1.5\"");
+            out += line_between(at, y, at, y + 13.0, "stroke=\"currentColor\" stroke-width=\"1.5\"");
             end = std::max(end, at);
         }
         out += text_at(end + 6.0, y + 11.0, "start",
@@ -250,7 +265,7 @@ std::string face_map(const std::vector<FaceDot>& dots, const std::string& unit) 
         const double px = 0.5 * kSidePx + (dot.x_mm - 0.5 * (x.low + x.high)) * scale;
         const double py = 0.5 * kSidePx - (dot.y_mm - 0.5 * (y.low + y.high)) * scale;
         out += fmt::format(
-            "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\" stroke=\"#345\" "
+            "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\" stroke=\"currentColor\" "
             "stroke-width=\"0.6\">"
             "<title>{}: {:.3g} {}</title></circle>\n",
             px, py, 4.0 + 6.0 * share, shade(share), escaped(dot.name), dot.value, escaped(unit));
@@ -259,7 +274,7 @@ std::string face_map(const std::vector<FaceDot>& dots, const std::string& unit) 
         const double share = 0.25 * step;
         const double py = kSidePx - kMarginPx - 26.0 * step;
         out += fmt::format(
-            "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\" stroke=\"#345\" "
+            "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\" stroke=\"currentColor\" "
             "stroke-width=\"0.6\"/>\n",
             kSidePx + 30.0, py, 4.0 + 6.0 * share, shade(share));
         out += text_at(kSidePx + 48.0, py + 4.0, "start", fmt::format("{:.3g} {}", share * most, unit));

@@ -7,16 +7,14 @@
 namespace rig::host {
 namespace {
 
-std::string page_of(const TrainedPack& pack, const Take* take, std::vector<TrainingCurve> curves) {
+std::string page_of(const TrainedPack& pack, const Take* take, bool with_training) {
     const SolvePack view = pack.view();
     const auto analysis = analyse_pack(view, take);
     EXPECT_TRUE(analysis);
-    return pack_page({.name = "a <face> & \"b\"",
-                      .pack = view,
-                      .analysis = *analysis,
-                      .rbf = pack.report.rbf,
-                      .coverage = pack.report.coverage,
-                      .curves = std::move(curves)});
+    std::optional<TrainingRecord> record;
+    if (with_training && pack.report.rbf)
+        record = TrainingRecord{"0", *pack.report.rbf, *pack.report.coverage, pack.shape_names};
+    return pack_page({.name = "a <face> & \"b\"", .pack = view, .analysis = *analysis, .training = record});
 }
 
 bool has(const std::string& html, std::string_view part) {
@@ -29,7 +27,7 @@ TEST(PackPage, NamesAreData) {
     tiny.layout.markers[3].name = "<b>&";
     const auto pack = train(tiny.rig, tiny.layout, {});
     ASSERT_TRUE(pack);
-    const std::string html = page_of(*pack, nullptr, {});
+    const std::string html = page_of(*pack, nullptr, true);
     EXPECT_FALSE(has(html, "<img"));
     EXPECT_FALSE(has(html, "<b>"));
     EXPECT_TRUE(has(html, "&lt;img src=x&gt;"));
@@ -41,11 +39,12 @@ TEST(PackPage, SaysWhatThePackAloneTells) {
     for (Float3& delta : tiny.rig.shapes[1].delta_mm) delta = {0.001F, 0.0F, 0.0F};
     const auto pack = train(tiny.rig, tiny.layout, {});
     ASSERT_TRUE(pack);
-    const std::string html = page_of(*pack, nullptr, {});
+    const std::string html = page_of(*pack, nullptr, true);
     for (const char* part : {"box-constrained QP", "Observability", "Conditioning", "Error by facial region",
                              "Rank and invisible shapes", "1 shapes move the markers by less than 0.5 mm"})
         EXPECT_TRUE(has(html, part)) << part;
-    EXPECT_FALSE(has(html, "RBF regression"));
+    EXPECT_TRUE(has(html, "Nothing of this pack was chosen by cross-validation"));
+    EXPECT_FALSE(has(html, "GCV path"));
     EXPECT_FALSE(has(html, "Measured:"));
     EXPECT_FALSE(has(html, "error rms"));
     EXPECT_TRUE(has(html, "<tr class=\"flagged\"><td>bulge_1</td>"));
@@ -59,16 +58,15 @@ TEST(PackPage, HoldsTheTrainingWhereThereWasOne) {
     options.rbf.centres = 30;
     const auto pack = train(tiny.rig, tiny.layout, options);
     ASSERT_TRUE(pack) << pack.error().message;
-    TrainingCurve curve;
-    curve.title = "GCV against lambda";
-    curve.chart.log_x = true;
-    curve.chart.series = {{"gcv", {{1e-4, 2.0}, {1e-2, 1.0}, {1.0, 3.0}}}};
-    curve.chart.marked_x = 1e-2;
-    const std::string html = page_of(*pack, &tiny.take, {curve});
-    for (const char* part : {"RBF regression", " references in ", "Trained on 200 frames",
-                             "Coverage:", "Measured: 200 frames", "GCV against lambda", "error rms"})
+    const std::string html = page_of(*pack, &tiny.take, true);
+    for (const char* part : {"Cross-validation", " references in ", "Trained on 200 frames", "GCV path",
+                             "Coverage", "Measured: 200 frames", "error rms"})
         EXPECT_TRUE(has(html, part)) << part;
-    EXPECT_EQ(html, page_of(*pack, &tiny.take, {curve}));
+    EXPECT_EQ(html, page_of(*pack, &tiny.take, true));
+    const std::string without = page_of(*pack, nullptr, false);
+    EXPECT_TRUE(has(without, "The curves of the training are not in a pack"));
+    EXPECT_FALSE(has(without, "GCV path"));
+    EXPECT_FALSE(has(without, "Coverage"));
 }
 
 }  // namespace
