@@ -76,9 +76,15 @@ void run_quadratic(const SolverConfig& config, SolverState& state, SolverWorkspa
                    SolverReport& report) {
     const std::size_t n = config.pack.shape_count;
     fill_bounds(config, w);
+    narrow_bounds<double>(config.controls, w.low, w.high);
     const BoxQpProblem problem{n, w.equations.hessian, w.equations.linear, w.low, w.high};
     for (std::size_t i = 0; i < n; ++i) output.weights[i] = state.previous[i];
-    const BoxQpReport qp = solve_box_qp(problem, config.qp, state.qp, w.qp, {output.weights.data(), n});
+    BoxQpReport qp = solve_box_qp(problem, config.qp, state.qp, w.qp, {output.weights.data(), n});
+    if (cancel_pairs<double>(config.controls, output.weights, w.low, w.high, state.cancel)) {
+        const std::uint16_t before = qp.iterations;
+        qp = solve_box_qp(problem, config.qp, state.qp, w.qp, {output.weights.data(), n});
+        qp.iterations = static_cast<std::uint16_t>(qp.iterations + before);
+    }
     report.optimal = qp.optimal;
     report.kkt = qp.kkt;
     report.iterations = qp.iterations;
@@ -99,6 +105,16 @@ void run_rbf(const SolverConfig& config, const InferenceOutput& completed, Solve
     report.hull_distance = rbf.nearest_widths;
 }
 
+// Controls need a quadratic: what RBF answered becomes a measurement of the weights.
+void control_rbf(const SolverConfig& config, double gamma, SolverState& state, SolverWorkspace& w,
+                 SolverOutput& output, SolverReport& report) {
+    measurement_problem<double>(config.controls, output.weights, w.equations.hessian, kMaxShapes,
+                                w.equations.linear, w.equations.constant_mm2);
+    add_controls<double>(config.controls, gamma, state.previous, w.equations.hessian, kMaxShapes,
+                         w.equations.linear, w.equations.constant_mm2);
+    run_quadratic(config, state, w, output, report);
+}
+
 }  // namespace
 
 void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& workspace,
@@ -112,6 +128,7 @@ void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& wo
     const ConfidenceInput everything{config.tables.full_gram, workspace.equations.data_diagonal,
                                      pack.prior_sigma, static_cast<double>(pack.noise_mm)};
     weight_confidence(everything, workspace.confidence, config.full_confidence);
+    prepare_controls(pack, ControlSet{}, config.controls);
 }
 
 void reset_solver(SolverState& state) {
@@ -146,7 +163,10 @@ void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const
     }
     if (pack.solver == SolverKind::kRbf) {
         run_rbf(config, completed, w, output, report);
+        if (config.controls.acts_on_problem) control_rbf(config, input.gamma_scale, state, w, output, report);
     } else {
+        add_controls<double>(config.controls, input.gamma_scale, state.previous, w.equations.hessian,
+                             kMaxShapes, w.equations.linear, w.equations.constant_mm2);
         run_quadratic(config, state, w, output, report);
     }
     for (std::size_t i = 0; i < n; ++i) {

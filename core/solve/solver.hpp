@@ -11,6 +11,7 @@
 #include "core/pack/solve_pack.hpp"
 #include "core/solve/box_qp.hpp"
 #include "core/solve/confidence.hpp"
+#include "core/solve/controls.hpp"
 #include "core/solve/normal_equations.hpp"
 #include "core/solve/rbf.hpp"
 #include "core/stabilise/stabilised_markers.hpp"
@@ -21,6 +22,7 @@ struct SolverConfig {
     SolvePack pack;       // spans; the bytes outlive the solver
     NormalTables tables;  // built once
     BoxQpConfig qp;
+    Controls controls;  // neutral after configure_solver(); may be prepared anew between frames
     double rate_hz = 60.0;
     double forget_s = 0.25;  // the temporal prior starts anew after a gap of this length
     std::array<float, kMaxShapes> full_confidence{};  // of each weight when every marker is seen
@@ -28,6 +30,7 @@ struct SolverConfig {
 
 struct SolverState {
     BoxQpState qp;
+    CancelState cancel;
     bool has_previous = false;
     std::int64_t previous_us = 0;
     std::array<double, kMaxShapes> previous{};
