@@ -179,7 +179,8 @@ void add_smooth_verb(CLI::App& app, int& exit_code) {
     verb->add_flag("--list-bands", options->list_bands,
                    "Only print the bands of this take and their periods");
     verb->footer(
-        "Band k is centred at a period of about 2.4 frames times 2^k, see --list-bands. A gain under 1 "
+        "Band 0 is motion from frame to frame; band k is centred at a period of about 3.7 frames times 2^k,\n"
+        "see --list-bands. A gain under 1 "
         "takes\n"
         "that motion back, one over 1 exaggerates it; all 1 changes nothing. Every weight stays in its "
         "range.\n"

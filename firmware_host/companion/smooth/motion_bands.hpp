@@ -5,11 +5,11 @@
 //   y = G_K + sum_k gain_k L_k
 //
 // w_0 = (1 4 6 4 1) / 16, the cubic B-spline kernel of the paper; w_k is w_0 with 2^k - 1 zeros between its
-// numbers, so nothing is decimated and every level has all frames. K = the largest with 2^K <= frames, at
-// least 1, so that G_K is little more than the mean. Band 0 holds the fastest motion, from frame to frame;
-// L_k is centred at a period of about 4.4 2^k frames. Beyond its ends a curve is continued by its point
-// reflection, 2 x_end - x, so that a ramp stays a ramp. All gains 1 give the input back to rounding, whatever
-// the bands.
+// numbers, so nothing is decimated and every level has all frames. K = the largest with 2^K <= frames, so
+// that G_K is little more than the mean. Band 0 holds the fastest motion, from frame to frame;
+// band k >= 1 is centred at a period of about 3.7 2^k frames (7.1, 15.0, ...). Beyond its ends a curve is
+// continued by its point reflection, 2 x_end - x, so that a ramp stays a ramp. All gains 1 give the input
+// back to rounding, whatever the bands.
 //
 // Not causal: for finished takes. On the board: core/filter.
 #pragma once
