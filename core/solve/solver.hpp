@@ -11,6 +11,7 @@
 #include "core/pack/solve_pack.hpp"
 #include "core/solve/box_qp.hpp"
 #include "core/solve/confidence.hpp"
+#include "core/solve/controls.hpp"
 #include "core/solve/normal_equations.hpp"
 #include "core/solve/rbf.hpp"
 #include "core/stabilise/stabilised_markers.hpp"
@@ -33,6 +34,19 @@ struct QuadraticWorkspace {
     std::array<Real, kMaxShapes> high{};
 };
 
+// The quadratic with the artist's terms on it, kept beside the pack's own while controls act: H changes when
+// they do or what is seen does. Always in double: a control may take every ridge away.
+struct ControlledState {
+    bool valid = false;
+    std::uint32_t version = 0;  // of H, and what it was made of:
+    std::uint32_t normal_version = 0;
+    std::uint32_t controls_version = 0;
+    double gamma_scale = 0.0;
+    alignas(64) std::array<double, kMaxShapes * kMaxShapeStride> hessian{};
+    BoxQpState<double> qp;
+    CancelState cancel;
+};
+
 struct SolverConfig {
     SolvePack pack;              // spans; the bytes outlive the solver
     NormalTables<float> tables;  // built once
@@ -41,6 +55,7 @@ struct SolverConfig {
     double pull_share = 0.0;
     BoxQpConfig qp;
     BoxQpConfig precise_qp{.tolerance = 1e-9};
+    Controls controls;  // neutral after configure_solver(); may be prepared anew between frames
     double rate_hz = 60.0;
     double forget_s = 0.25;  // the temporal prior starts anew after a gap of this length
     std::array<float, kMaxShapes> full_confidence{};  // of each weight when every marker is seen
@@ -50,6 +65,7 @@ struct SolverState {
     QuadraticState<float> quadratic;
     QuadraticState<double> precise;
     bool in_single = false;  // precision of the last frame
+    ControlledState controlled;
     bool has_previous = false;
     std::int64_t previous_us = 0;
     std::array<double, kMaxShapes> previous{};
