@@ -85,18 +85,28 @@ void run_quadratic(const SolverConfig& config, SolverState& state, SolverWorkspa
     report.objective_mm2 = 2.0 * qp.objective + w.equations.constant_mm2;
 }
 
-void run_rbf(const SolverConfig& config, const InferenceOutput& completed, SolverWorkspace& w,
-             SolverOutput& output, SolverReport& report) {
+// w = (1 - a) w_rbf + a w_qp, a rising smoothly with the distance from the references [ours; methods.md 3.2].
+void run_rbf(const SolverConfig& config, const InferenceOutput& completed, SolverState& state,
+             SolverWorkspace& w, SolverOutput& output, SolverReport& report) {
+    const std::size_t n = config.pack.shape_count;
     for (std::size_t k = 0; k < config.pack.marker_count; ++k) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
             w.flat_mm[3 * k + axis] =
                 static_cast<float>(completed.position_mm[k][static_cast<Eigen::Index>(axis)]);
         }
     }
-    const RbfReport rbf = evaluate_rbf(config.pack, {w.flat_mm.data(), 3U * config.pack.marker_count}, w.rbf,
-                                       {output.weights.data(), config.pack.shape_count});
+    const RbfReport rbf =
+        evaluate_rbf(config.rbf, {w.flat_mm.data(), config.rbf.rows}, w.rbf, {w.rbf_weights.data(), n});
     report.optimal = true;
-    report.hull_distance = rbf.nearest_widths;
+    report.hull_distance = static_cast<double>(rbf.nearest_widths);
+    report.hull_share = static_cast<double>(rbf.hull_share);
+    if (report.hull_share > 0.0) run_quadratic(config, state, w, output, report);
+    for (std::size_t i = 0; i < n; ++i) {
+        const auto reference = static_cast<double>(w.rbf_weights[i]);
+        output.weights[i] = report.hull_share > 0.0
+                                ? reference + report.hull_share * (output.weights[i] - reference)
+                                : reference;
+    }
 }
 
 }  // namespace
@@ -106,6 +116,7 @@ void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& wo
     config.pack = pack;
     config.rate_hz = rate_hz;
     build_normal_tables(pack, config.tables);
+    if (pack.solver == SolverKind::kRbf) build_rbf_tables(pack, config.rbf);
     for (std::size_t i = 0; i < pack.shape_count; ++i) {
         workspace.equations.data_diagonal[i] = config.tables.full_gram[i * kMaxShapes + i];
     }
@@ -145,7 +156,7 @@ void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const
         return;
     }
     if (pack.solver == SolverKind::kRbf) {
-        run_rbf(config, completed, w, output, report);
+        run_rbf(config, completed, state, w, output, report);
     } else {
         run_quadratic(config, state, w, output, report);
     }

@@ -20,6 +20,7 @@ namespace rig {
 struct SolverConfig {
     SolvePack pack;       // spans; the bytes outlive the solver
     NormalTables tables;  // built once
+    RbfTables rbf;        // built once, for an RBF pack
     BoxQpConfig qp;
     double rate_hz = 60.0;
     double forget_s = 0.25;  // the temporal prior starts anew after a gap of this length
@@ -41,6 +42,7 @@ struct SolverWorkspace {
     NormalEquations equations;
     BoxQpWorkspace qp;
     RbfWorkspace rbf;
+    std::array<float, kMaxShapes> rbf_weights{};
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> weights{};
     std::array<double, kMaxShapes> low{};
@@ -63,6 +65,9 @@ struct SolverReport {
     std::uint16_t markers_used = 0;
     double residual_rms_mm = 0.0;
     double hull_distance = 0.0;  // RBF: distance to the nearest centre, in that centre's widths
+    // RBF: share of the box QP in the answer, 0 unless the pack has a fallback. Where it is not 0, the
+    // certificate (optimal, kkt, objective, iterations) is the QP's, at its own answer.
+    double hull_share = 0.0;
 };
 
 // Not for frames: the workspace is only scratch here.
