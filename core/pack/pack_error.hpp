@@ -53,6 +53,8 @@ enum class PackError : std::uint8_t {
     kNameTwice,
     kRbfWidths,
     kRbfBasis,
+    kRbfKernel,
+    kRbfHull,
     kCameraIntrinsics,
     kCameraRotation,
     kCount  // how many there are; never returned

@@ -70,42 +70,101 @@ void update_confidence(const SolverConfig& config, const NormalState<Real>& norm
 }
 
 template <typename Real>
-void run_quadratic(const SolverConfig& config, SolverState& state, QuadraticState<Real>& quadratic,
-                   QuadraticWorkspace<Real>& w, SolverOutput& output, SolverReport& report) {
+BoxQpProblem<Real> pack_problem(const SolverConfig& config, const NormalState<Real>& normal,
+                                QuadraticWorkspace<Real>& w) {
     const std::size_t n = config.pack.shape_count;
     fill_bounds(config.pack, w);
-    const std::size_t stride = row_stride(n);
-    const BoxQpProblem<Real> problem{n,
-                                     stride,
-                                     {quadratic.normal.hessian.data(), n * stride},
-                                     w.equations.linear,
-                                     w.low,
-                                     w.high,
-                                     quadratic.normal.version};
-    for (std::size_t i = 0; i < n; ++i) w.weights[i] = static_cast<Real>(state.previous[i]);
-    const BoxQpReport qp =
-        solve_box_qp(problem, sizeof(Real) == sizeof(float) ? config.qp : config.precise_qp, quadratic.qp,
-                     w.qp, std::span<Real>(w.weights.data(), n));
-    for (std::size_t i = 0; i < n; ++i) output.weights[i] = static_cast<double>(w.weights[i]);
-    report.optimal = qp.optimal;
-    report.kkt = qp.kkt;
-    report.iterations = qp.iterations;
-    report.changes = qp.changes;
-    report.objective_mm2 = 2.0 * qp.objective + w.equations.constant_mm2;
+    return {n,      row_stride(n), {normal.hessian.data(), n * row_stride(n)}, w.equations.linear, w.low,
+            w.high, normal.version};
 }
 
+void add_certificate(const BoxQpReport& qp, double constant_mm2, SolverReport& report) {
+    report.optimal = qp.optimal;
+    report.kkt = qp.kkt;
+    report.iterations = static_cast<std::uint16_t>(report.iterations + qp.iterations);
+    report.changes = static_cast<std::uint16_t>(report.changes + qp.changes);
+    report.objective_mm2 = 2.0 * qp.objective + constant_mm2;
+}
+
+template <typename Real>
+void run_quadratic(const SolverConfig& config, const BoxQpProblem<Real>& problem, const SolverState& state,
+                   BoxQpState<Real>& qp, QuadraticWorkspace<Real>& w, SolverOutput& output,
+                   SolverReport& report) {
+    const std::size_t n = problem.size;
+    for (std::size_t i = 0; i < n; ++i) w.weights[i] = static_cast<Real>(state.previous[i]);
+    const BoxQpReport solved =
+        solve_box_qp(problem, sizeof(Real) == sizeof(float) ? config.qp : config.precise_qp, qp, w.qp,
+                     std::span<Real>(w.weights.data(), n));
+    for (std::size_t i = 0; i < n; ++i) output.weights[i] = static_cast<double>(w.weights[i]);
+    add_certificate(solved, w.equations.constant_mm2, report);
+}
+
+// H with the artist's terms; normal: null when the answer of a solver without a quadratic is the measurement.
+void follow_controls(const SolverConfig& config, const NormalState<double>* normal, double gamma_scale,
+                     ControlledState& c) {
+    const std::size_t n = config.pack.shape_count;
+    const std::size_t stride = row_stride(n);
+    const std::uint32_t normal_version = normal != nullptr ? normal->version : 0;
+    if (c.valid && c.normal_version == normal_version && c.controls_version == config.controls.version &&
+        c.gamma_scale == gamma_scale)
+        return;
+    const std::span<double> hessian(c.hessian.data(), n * stride);
+    if (normal != nullptr) {
+        std::copy_n(normal->hessian.begin(), n * stride, hessian.begin());
+    } else {
+        measurement_curvature(config.controls, hessian, stride);
+    }
+    add_control_curvature(config.controls, gamma_scale, hessian, stride);
+    c.valid = true;
+    ++c.version;
+    c.normal_version = normal_version;
+    c.controls_version = config.controls.version;
+    c.gamma_scale = gamma_scale;
+}
+
+// output.weights: the measurement when `normal` is null.
+void run_controlled(const SolverConfig& config, const NormalState<double>* normal, double gamma_scale,
+                    SolverState& state, QuadraticWorkspace<double>& w, SolverOutput& output,
+                    SolverReport& report) {
+    const std::size_t n = config.pack.shape_count;
+    ControlledState& c = state.controlled;
+    follow_controls(config, normal, gamma_scale, c);
+    NormalEquations<double>& e = w.equations;
+    if (normal == nullptr) measurement_pull(config.controls, output.weights, e.linear, e.constant_mm2);
+    add_control_pull(config.controls, gamma_scale, state.previous, e.linear, e.constant_mm2);
+    fill_bounds(config.pack, w);
+    narrow_bounds(config.controls, w.low, w.high);
+    const std::size_t stride = row_stride(n);
+    const BoxQpProblem<double> problem{n,      stride,   {c.hessian.data(), n * stride}, e.linear, w.low,
+                                       w.high, c.version};
+    run_quadratic(config, problem, state, c.qp, w, output, report);
+    if (cancel_pairs(config.controls, output.weights, w.low, w.high, c.cancel)) {
+        run_quadratic(config, problem, state, c.qp, w, output, report);
+    }
+}
+
+// w.rbf_weights: what the references say; report.hull_share: how far the face is from them.
 void run_rbf(const SolverConfig& config, const InferenceOutput& completed, SolverWorkspace& w,
-             SolverOutput& output, SolverReport& report) {
+             SolverReport& report) {
     for (std::size_t k = 0; k < config.pack.marker_count; ++k) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
             w.flat_mm[3 * k + axis] =
                 static_cast<float>(completed.position_mm[k][static_cast<Eigen::Index>(axis)]);
         }
     }
-    const RbfReport rbf = evaluate_rbf(config.pack, {w.flat_mm.data(), 3U * config.pack.marker_count}, w.rbf,
-                                       {output.weights.data(), config.pack.shape_count});
+    const RbfReport rbf = evaluate_rbf(config.rbf, {w.flat_mm.data(), config.rbf.rows}, w.rbf,
+                                       {w.rbf_weights.data(), config.pack.shape_count});
     report.optimal = true;
-    report.hull_distance = rbf.nearest_widths;
+    report.hull_distance = static_cast<double>(rbf.nearest_widths);
+    report.hull_share = static_cast<double>(rbf.hull_share);
+}
+
+// w = (1 - a) w_rbf + a w_qp, a rising smoothly with the distance from the references [ours; methods.md 3.2].
+void blend_rbf(std::span<const float> references, double share, SolverOutput& output) {
+    for (std::size_t i = 0; i < references.size(); ++i) {
+        const auto reference = static_cast<double>(references[i]);
+        output.weights[i] = share > 0.0 ? reference + share * (output.weights[i] - reference) : reference;
+    }
 }
 
 // Below this share of the mean diagonal of B^T B, ridge and pull leave float's inverse to wear out.
@@ -155,10 +214,19 @@ void solve_in(const SolverConfig& config, const NormalTables<Real>& tables, cons
         output.weights = state.previous;
         return;
     }
-    if (pack.solver == SolverKind::kRbf) {
-        run_rbf(config, completed, w, output, report);
-    } else {
-        run_quadratic(config, state, quadratic, own, output, report);
+    const bool is_rbf = pack.solver == SolverKind::kRbf;
+    const bool controlled = config.controls.acts_on_problem;  // then Real is double
+    if (is_rbf) run_rbf(config, completed, w, report);
+    if (is_rbf ? report.hull_share > 0.0 : !controlled) {
+        run_quadratic(config, pack_problem(config, quadratic.normal, own), state, quadratic.qp, own, output,
+                      report);
+    }
+    if (is_rbf) blend_rbf({w.rbf_weights.data(), n}, report.hull_share, output);
+    if constexpr (sizeof(Real) == sizeof(double)) {
+        if (controlled) {
+            run_controlled(config, is_rbf ? nullptr : &quadratic.normal, input.gamma_scale, state, own,
+                           output, report);
+        }
     }
     for (std::size_t i = 0; i < n; ++i) {
         if (!is_finite(output.weights[i])) output.weights[i] = state.previous[i];
@@ -181,9 +249,11 @@ void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& wo
     measure_firmness(pack, config);
     configure_tables(pack, config.tables, workspace);
     configure_tables(pack, config.precise_tables, workspace);
+    if (pack.solver == SolverKind::kRbf) build_rbf_tables(pack, config.rbf);
     weight_confidence(
         {workspace.gram, workspace.gram_diagonal, pack.prior_sigma, static_cast<double>(pack.noise_mm)},
         workspace.confidence, config.full_confidence);
+    prepare_controls(pack, ControlSet{}, config.controls);
 }
 
 void reset_solver(SolverState& state) {
@@ -191,6 +261,7 @@ void reset_solver(SolverState& state) {
     state.quadratic.qp.warm = false;
     state.precise.normal.valid = false;
     state.precise.qp.warm = false;
+    state.controlled.qp.warm = false;
     state.has_previous = false;
     state.has_confidence = false;
     state.confidence = {};
@@ -208,7 +279,8 @@ void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const
     input.weights = {w.weights.data(), pack.marker_count};
     input.previous = {state.previous.data(), pack.shape_count};
     input.gamma_scale = gamma_scale(config, state, capture_us);
-    const bool single = config.ridge_share + input.gamma_scale * config.pull_share >= kFirmShare;
+    const bool firm = config.ridge_share + input.gamma_scale * config.pull_share >= kFirmShare;
+    const bool single = firm && !config.controls.acts_on_problem;
     if (single != state.in_single) state.has_confidence = false;
     state.in_single = single;
     if (single) {

@@ -11,6 +11,7 @@
 #include "core/pack/solve_pack.hpp"
 #include "core/solve/box_qp.hpp"
 #include "core/solve/confidence.hpp"
+#include "core/solve/controls.hpp"
 #include "core/solve/normal_equations.hpp"
 #include "core/solve/rbf.hpp"
 #include "core/stabilise/stabilised_markers.hpp"
@@ -33,14 +34,29 @@ struct QuadraticWorkspace {
     std::array<Real, kMaxShapes> high{};
 };
 
+// The quadratic with the artist's terms on it, kept beside the pack's own while controls act: H changes when
+// they do or what is seen does. Always in double: a control may take every ridge away.
+struct ControlledState {
+    bool valid = false;
+    std::uint32_t version = 0;  // of H, and what it was made of:
+    std::uint32_t normal_version = 0;
+    std::uint32_t controls_version = 0;
+    double gamma_scale = 0.0;
+    alignas(64) std::array<double, kMaxShapes * kMaxShapeStride> hessian{};
+    BoxQpState<double> qp;
+    CancelState cancel;
+};
+
 struct SolverConfig {
     SolvePack pack;              // spans; the bytes outlive the solver
     NormalTables<float> tables;  // built once
     NormalTables<double> precise_tables;
     double ridge_share = 0.0;  // ridge and least pull, relative to the mean diagonal of B^T B
     double pull_share = 0.0;
+    RbfTables rbf;  // of an RBF pack; its hull_share asks for the quadratic
     BoxQpConfig qp;
     BoxQpConfig precise_qp{.tolerance = 1e-9};
+    Controls controls;  // neutral after configure_solver(); may be prepared anew between frames
     double rate_hz = 60.0;
     double forget_s = 0.25;  // the temporal prior starts anew after a gap of this length
     std::array<float, kMaxShapes> full_confidence{};  // of each weight when every marker is seen
@@ -50,6 +66,7 @@ struct SolverState {
     QuadraticState<float> quadratic;
     QuadraticState<double> precise;
     bool in_single = false;  // precision of the last frame
+    ControlledState controlled;
     bool has_previous = false;
     std::int64_t previous_us = 0;
     std::array<double, kMaxShapes> previous{};
@@ -62,6 +79,7 @@ struct SolverWorkspace {
     QuadraticWorkspace<float> quadratic;
     QuadraticWorkspace<double> precise;
     RbfWorkspace rbf;
+    std::array<float, kMaxShapes> rbf_weights{};
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> weights{};
     std::array<double, kMaxShapes * kMaxShapes> gram{};  // B^T V B for the confidence
@@ -85,6 +103,9 @@ struct SolverReport {
     std::uint16_t markers_used = 0;
     double residual_rms_mm = 0.0;
     double hull_distance = 0.0;  // RBF: distance to the nearest centre, in that centre's widths
+    // RBF: share of the box QP in the answer, 0 unless the pack has a fallback. Where it is not 0, the
+    // certificate (optimal, kkt, objective, iterations) is the QP's, at its own answer.
+    double hull_share = 0.0;
 };
 
 // Not for frames: the workspace is only scratch here.

@@ -41,6 +41,7 @@ struct TrainCommand {
     std::string report;
     std::string name;
     std::vector<std::string> takes;
+    std::vector<double> hull_fallback;  // near, far
     TrainOptions options;
     PackIdentity identity;
 };
@@ -70,10 +71,17 @@ void print_result(const TrainCommand& command, const TrainedPack& pack) {
     if (!pack.report.rbf) return;
     const RbfTrainingReport& rbf = *pack.report.rbf;
     fmt::print(
-        "rbf: {} frames, {} references, {} dimensions ({:.2f} % of the variance), width {} x spacing, lambda "
-        "{:.2g}\n",
-        rbf.frames, rbf.centres, rbf.dimensions, 100.0 * rbf.variance_kept, rbf.width_factor,
-        rbf.median_lambda);
+        "rbf: {} kernel, {} frames, {} references, {} dimensions ({:.2f} % of the variance), width {} x "
+        "spacing, lambda {:.2g}\n",
+        rbf_kernel_name(pack.rbf.kernel), rbf.frames, rbf.centres, rbf.dimensions, 100.0 * rbf.variance_kept,
+        rbf.width_factor, rbf.median_lambda);
+    fmt::print(
+        "rbf: the take's own frames lie {:.2f} widths from their nearest reference, 95 % within {:.2f}\n",
+        rbf.distance_p50, rbf.distance_p95);
+    if (pack.rbf.hull_far_widths > 0.0F) {
+        fmt::print("rbf: goes over to the box QP from {} to {} widths from its nearest reference\n",
+                   pack.rbf.hull_near_widths, pack.rbf.hull_far_widths);
+    }
     fmt::print("rbf weight rms: {:.4f} in the take ({:.4f} over visible shapes), {:.4f} on blocks left out\n",
                rbf.in_take_rms, rbf.visible_in_take_rms, rbf.cross_validated_rms);
     const Coverage& coverage = *pack.report.coverage;
@@ -204,20 +212,26 @@ void print_residual(const TrainedPack& pack, const MarkerTake& take) {
         *residual / pack.noise_mm));
 }
 
-int run_train(TrainCommand& command) {
+// Reads the options that are text; what is wrong with the command line, empty when nothing is.
+std::string fault_of_command(TrainCommand& command) {
     if (!read_temporal(command.temporal, command.options.temporal)) {
-        print_error(
-            fmt::format("--temporal {}: give auto, on, off or the step a weight takes in a frame, e.g. 0.03",
-                        command.temporal));
-        return kExitUsage;
+        return fmt::format(
+            "--temporal {}: give auto, on, off or the step a weight takes in a frame, e.g. 0.03",
+            command.temporal);
     }
     if (!command.hold.empty() && (command.markers.empty() || !read_frame_range(command.hold))) {
-        print_error(
-            fmt::format("--hold {}: give the frames of --markers in which the face holds still, e.g. 0:60",
-                        command.hold));
-        return kExitUsage;
+        return fmt::format("--hold {}: give the frames of --markers in which the face holds still, e.g. 0:60",
+                           command.hold);
     }
-    if (const std::string fault = fault_of_options(command.options, command.takes.size()); !fault.empty()) {
+    if (!command.hull_fallback.empty()) {
+        command.options.rbf.hull_near_widths = command.hull_fallback.front();
+        command.options.rbf.hull_far_widths = command.hull_fallback.back();
+    }
+    return fault_of_options(command.options, command.takes.size());
+}
+
+int run_train(TrainCommand& command) {
+    if (const std::string fault = fault_of_command(command); !fault.empty()) {
         print_error(fault);
         return kExitUsage;
     }
@@ -258,6 +272,42 @@ int run_train(TrainCommand& command) {
     return kExitOk;
 }
 
+CLI::Option* add_noise_options(CLI::App& verb, TrainCommand& command) {
+    CLI::Option* noise = verb.add_option("--noise-mm", command.options.noise_mm,
+                                         "standard deviation of one marker coordinate");
+    noise->capture_default_str()->type_name("MM");
+    verb.add_option("--markers", command.markers,
+                    "recorded markers (frames, markers, 3) .npy to estimate the noise from")
+        ->type_name("M.npy");
+    verb.add_option("--hold", command.hold,
+                    "frames of --markers in which the face holds still; END not included")
+        ->type_name("BEGIN:END");
+    return noise;
+}
+
+void add_rbf_options(CLI::App& verb, TrainCommand& command) {
+    RbfTrainingOptions& rbf = command.options.rbf;
+    verb.add_option("--centres", rbf.centres, "reference frames of the rbf")
+        ->capture_default_str()
+        ->type_name("K");
+    verb.add_option("--dimensions", rbf.dimensions, "components of the rbf; 0: by cross-validation")
+        ->capture_default_str()
+        ->type_name("D");
+    const std::map<std::string, RbfKernel> kernels = {{"gaussian", RbfKernel::kGaussian},
+                                                      {"thin-plate", RbfKernel::kThinPlate},
+                                                      {"multiquadric", RbfKernel::kMultiquadric}};
+    verb.add_option("--rbf-kernel", rbf.kernel, "gaussian, thin-plate or multiquadric")
+        ->transform(CLI::CheckedTransformer(kernels, CLI::ignore_case).description(""))
+        ->type_name("NAME")
+        ->default_str("gaussian");
+    verb.add_option("--hull-fallback", command.hull_fallback,
+                    "distances to the nearest reference, in its widths, between which the rbf's answer goes "
+                    "over to the box QP's; this verb says what the take's own frames have [none]")
+        ->delimiter(',')
+        ->expected(2)
+        ->type_name("NEAR,FAR");
+}
+
 }  // namespace
 
 void add_train_verb(CLI::App& app, int& exit_code) {
@@ -280,15 +330,7 @@ void add_train_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--cameras", command->cameras,
                      "cameras.json of the helmet; without it the pack solves marker streams only")
         ->type_name("JSON");
-    CLI::Option* noise = verb->add_option("--noise-mm", command->options.noise_mm,
-                                          "standard deviation of one marker coordinate");
-    noise->capture_default_str()->type_name("MM");
-    verb->add_option("--markers", command->markers,
-                     "recorded markers (frames, markers, 3) .npy to estimate the noise from")
-        ->type_name("M.npy");
-    verb->add_option("--hold", command->hold,
-                     "frames of --markers in which the face holds still; END not included")
-        ->type_name("BEGIN:END");
+    CLI::Option* noise = add_noise_options(*verb, *command);
     verb->add_option("--rate", command->options.rate_hz, "frame rate it is for")
         ->capture_default_str()
         ->type_name("HZ");
@@ -304,13 +346,7 @@ void add_train_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--ridge", command->options.ridge,
                      fmt::format("weight of sum w^2, in the same units [boxqp: {}]", kDefaultRidge))
         ->type_name("X");
-    verb->add_option("--centres", command->options.rbf.centres, "reference frames of the rbf")
-        ->capture_default_str()
-        ->type_name("K");
-    verb->add_option("--dimensions", command->options.rbf.dimensions,
-                     "components of the rbf; 0: by cross-validation")
-        ->capture_default_str()
-        ->type_name("D");
+    add_rbf_options(*verb, *command);
     verb->add_option("--report", command->report, "HTML page about the pack and its training")
         ->type_name("HTML");
     verb->add_option("--name", command->name, "name inside the pack [the file's]")->type_name("NAME");
@@ -320,7 +356,10 @@ void add_train_verb(CLI::App& app, int& exit_code) {
     verb->footer(
         "Examples:\n  headrig train --rig sample --layout 60 --solver boxqp --cameras cameras.json --out "
         "face.pack\n"
-        "  headrig train --rig sample --solver rbf --take sample/take.csv --out rbf.pack");
+        "  headrig train --rig sample --solver rbf --take sample/take.csv --out rbf.pack --report rbf.html\n"
+        "  headrig train --rig fitted --markers rom.npy --hold 0:60 --out face.pack\n"
+        "A regression also leaves what training saw beside the pack, NAME.training.csv, for `headrig "
+        "report`.");
     verb->callback([command, noise, &exit_code] {
         command->noise_given = noise->count() > 0;
         exit_code = run_train(*command);

@@ -1,5 +1,5 @@
-// One case of the experiment "hybrid16-barycentric": marker-to-mesh initialisation over a range-of-motion take
-// [Hybrid16 section 6].
+// One case of the experiment "hybrid16-barycentric": marker-to-mesh initialisation over a range-of-motion
+// take [Hybrid16 section 6].
 //
 // The true places are the head's layout of 60 markers; the layout as given has every marker moved 1 or 3 mm
 // along the skin, each in a direction of its own. The take is the recorded performance on the true places

@@ -1,6 +1,6 @@
 // Hybrid16 section 6: barycentric optimisation of markers whose places are known only roughly, "three to four
-// rounds". The trial behind the bound had 1.17 mm before and 0.19 mm after four rounds at 1 mm misplacement, and
-// stalled at 0.73 mm at 3 mm.
+// rounds". The trial behind the bound had 1.17 mm before and 0.19 mm after four rounds at 1 mm misplacement,
+// and stalled at 0.73 mm at 3 mm.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -36,8 +36,8 @@ std::vector<std::string> row_of(const BarycentricCase& which, const BarycentricF
 
 Result<ExperimentTable, FileError> hybrid16_barycentric(const std::filesystem::path& data) {
     ExperimentTable out;
-    out.columns = {"placement",      "misplaced",        "seed",           "given, mm",   "found, mm",
-                   "rounds",         "with offsets, mm", "place error, mm", "scale error", "mm by round"};
+    out.columns = {"placement",        "misplaced",       "seed",        "given, mm",  "found, mm", "rounds",
+                   "with offsets, mm", "place error, mm", "scale error", "mm by round"};
     double worst_mm = 0.0;
     double most_rounds = 0.0;
     for (const Placement placement : {Placement::kTake, Placement::kNeutral}) {

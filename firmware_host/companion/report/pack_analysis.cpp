@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "firmware_host/companion/fit/take_solve.hpp"
+#include "firmware_host/companion/train/white_noise.hpp"
 
 namespace rig::host {
 
@@ -98,30 +99,17 @@ void describe_regions(PackAnalysis& out) {
     }
 }
 
-// Repeatable white noise: SplitMix64 (Steele, Lea, Flood 2014) and the sum of twelve uniforms.
-double next_normal(std::uint64_t& state) {
-    double sum = -6.0;
-    for (int i = 0; i < 12; ++i) {
-        state += 0x9e3779b97f4a7c15ULL;
-        std::uint64_t z = state;
-        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-        z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-        sum += static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
-    }
-    return sum;
-}
-
 MarkerTake played(const SolvePack& pack, const MatrixXd& truth_mm, double rate_hz) {
     MarkerTake take{.frame_count = static_cast<std::size_t>(truth_mm.rows()),
                     .marker_count = pack.marker_count,
                     .rate_hz = rate_hz,
                     .positions_mm = {}};
-    std::uint64_t state = kNoiseSeed;
+    WhiteNoise white(kNoiseSeed);
     const auto noise = static_cast<double>(pack.noise_mm);
     for (Index f = 0; f < truth_mm.rows(); ++f) {
         for (Index k = 0; k < pack.marker_count; ++k) {
             Vec3 p;
-            for (Index a = 0; a < 3; ++a) p[a] = truth_mm(f, 3 * k + a) + noise * next_normal(state);
+            for (Index a = 0; a < 3; ++a) p[a] = truth_mm(f, 3 * k + a) + noise * white.next();
             take.positions_mm.push_back(p);
         }
     }
