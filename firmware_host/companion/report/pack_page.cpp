@@ -140,8 +140,12 @@ void regions(const PackPageInput& input, Page& page) {
         dots.push_back({marker.name, marker.neutral_mm[0], marker.neutral_mm[1],
                         marker.error_rms_mm.value_or(marker.predicted_mm)});
     }
-    page.figure(face_map(dots, "mm"), analysis.take ? "Measured error of each marker, face from the front."
-                                                    : "Predicted error of each marker, face from the front.");
+    page.figure(
+        face_map(dots, "mm"),
+        analysis.take
+            ? "Measured error of each marker, rms; the face from the front, the performer's left on the "
+              "right."
+            : "Predicted error of each marker; the face from the front, the performer's left on the right.");
 }
 
 void coverage_table(const Coverage& coverage, Page& page) {

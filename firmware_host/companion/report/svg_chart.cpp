@@ -18,6 +18,7 @@ constexpr double kLeftPx = 70.0;
 constexpr double kRightPx = 20.0;
 constexpr double kTopPx = 14.0;
 constexpr double kBottomPx = 48.0;
+constexpr double kLegendPx = 14.0;
 // Text, axes and grid take the page's own colour; these are told from white and from near black.
 constexpr std::array kColours{"#3b82c4", "#d9773f", "#3f9e6b", "#9a6fc4", "#b8952b", "#8a8a8a"};
 constexpr std::string_view kAxis = "stroke=\"currentColor\" stroke-opacity=\"0.7\"";
@@ -62,7 +63,7 @@ void widen(Axis& axis, double value) {
     axis.high = std::max(axis.high, value);
 }
 
-// Whole decades, or zero and a little air above; never empty.
+// Whole decades; never empty.
 void settle(Axis& axis) {
     if (!(axis.low <= axis.high)) {
         axis.low = axis.logarithmic ? 1.0 : 0.0;
@@ -78,6 +79,24 @@ void settle(Axis& axis) {
     if (axis.low >= axis.high) axis.high = axis.low + std::max(1.0, std::abs(axis.low));
 }
 
+// To the ticks below and above: the curve ends inside, and both ends of the axis have a number.
+void round_out(Axis& axis) {
+    if (axis.logarithmic) return;
+    for (int again = 0; again < 2; ++again) {  // a wider axis may have wider steps
+        const std::vector<double> ticks = axis_ticks(axis.low, axis.high, false);
+        if (ticks.size() < 2) return;
+        const double step = ticks[1] - ticks[0];
+        axis.low = step * std::floor(axis.low / step + 1e-9);
+        axis.high = step * std::ceil(axis.high / step - 1e-9);
+    }
+}
+
+// Short, and without the -0 of the arithmetic; a decade that is no plain number as a power.
+std::string tick_text(double tick, bool logarithmic) {
+    if (logarithmic && (tick < 0.9e-3 || tick > 1.1e4)) return fmt::format("1e{:.0f}", std::log10(tick));
+    return fmt::format("{:.4g}", tick + 0.0);
+}
+
 Axis empty_axis(bool logarithmic) {
     return {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(), logarithmic};
 }
@@ -86,9 +105,10 @@ Axis empty_axis(bool logarithmic) {
 struct Frame {
     Axis x;
     Axis y;
+    double top_px = kTopPx;  // the legend is above
     [[nodiscard]] double x_px(double v) const { return kLeftPx + x.at(v) * (kWidthPx - kLeftPx - kRightPx); }
     [[nodiscard]] double y_px(double v) const {
-        return kHeightPx - kBottomPx - y.at(v) * (kHeightPx - kTopPx - kBottomPx);
+        return kHeightPx - kBottomPx - y.at(v) * (kHeightPx - top_px - kBottomPx);
     }
 };
 
@@ -97,19 +117,19 @@ std::string draw_axes(const Frame& frame, const LineChart& chart) {
     const double bottom = kHeightPx - kBottomPx;
     for (const double tick : axis_ticks(frame.y.low, frame.y.high, frame.y.logarithmic)) {
         out += line_between(kLeftPx, frame.y_px(tick), kWidthPx - kRightPx, frame.y_px(tick), kGrid);
-        out += text_at(kLeftPx - 6.0, frame.y_px(tick) + 4.0, "end", fmt::format("{:.4g}", tick));
+        out += text_at(kLeftPx - 6.0, frame.y_px(tick) + 4.0, "end", tick_text(tick, frame.y.logarithmic));
     }
     for (const double tick : axis_ticks(frame.x.low, frame.x.high, frame.x.logarithmic)) {
         out += line_between(frame.x_px(tick), bottom, frame.x_px(tick), bottom + 4.0, kAxis);
-        out += text_at(frame.x_px(tick), bottom + 16.0, "middle", fmt::format("{:.4g}", tick));
+        out += text_at(frame.x_px(tick), bottom + 16.0, "middle", tick_text(tick, frame.x.logarithmic));
     }
     out += line_between(kLeftPx, bottom, kWidthPx - kRightPx, bottom, kAxis);
-    out += line_between(kLeftPx, kTopPx, kLeftPx, bottom, kAxis);
+    out += line_between(kLeftPx, frame.top_px, kLeftPx, bottom, kAxis);
     out += text_at(0.5 * (kLeftPx + kWidthPx - kRightPx), kHeightPx - 14.0, "middle", chart.x_name);
     out += fmt::format(
         "<text transform=\"translate(14 {:.1f}) rotate(-90)\" text-anchor=\"middle\" "
         "fill=\"currentColor\">{}</text>\n",
-        0.5 * (kTopPx + bottom), escaped(chart.y_name));
+        0.5 * (frame.top_px + bottom), escaped(chart.y_name));
     return out;
 }
 
@@ -195,25 +215,29 @@ std::string line_chart(const LineChart& chart) {
         }
     }
     if (chart.marked_x) widen(frame.x, *chart.marked_x);
-    if (!chart.log_y) widen(frame.y, 0.0);
+    if (!chart.log_y && chart.from_zero) widen(frame.y, 0.0);
     settle(frame.x);
     settle(frame.y);
+    round_out(frame.y);
+    const bool crowd = chart.series.size() > kColours.size();
+    const bool legend = chart.series.size() > 1 && !crowd;
+    if (legend) frame.top_px += kLegendPx;
     std::string out = open_svg(kWidthPx, kHeightPx, chart.y_name + " against " + chart.x_name);
     out += draw_axes(frame, chart);
     if (chart.marked_x && frame.x.shows(*chart.marked_x)) {
-        out += line_between(frame.x_px(*chart.marked_x), kTopPx, frame.x_px(*chart.marked_x),
+        out += line_between(frame.x_px(*chart.marked_x), frame.top_px, frame.x_px(*chart.marked_x),
                             kHeightPx - kBottomPx,
                             "stroke=\"currentColor\" stroke-opacity=\"0.6\" stroke-dasharray=\"4 3\"");
     }
-    const bool crowd = chart.series.size() > kColours.size();
+    double legend_px = kLeftPx;
     for (std::size_t s = 0; s < chart.series.size(); ++s) {
         const Pen pen = crowd ? Pen{kColours[0], 1.0, 0.5} : Pen{kColours[s]};
         out += draw_series(frame, chart.series[s], pen, chart);
-        if (chart.series.size() < 2 || crowd) continue;
-        const double y = kTopPx + 12.0 + 15.0 * static_cast<double>(s);
-        out += line_between(kWidthPx - 190.0, y - 4.0, kWidthPx - 172.0, y - 4.0,
+        if (!legend) continue;
+        out += line_between(legend_px, kTopPx - 2.0, legend_px + 18.0, kTopPx - 2.0,
                             fmt::format("stroke=\"{}\" stroke-width=\"2\"", pen.colour));
-        out += text_at(kWidthPx - 166.0, y, "start", chart.series[s].name);
+        out += text_at(legend_px + 24.0, kTopPx + 2.0, "start", chart.series[s].name);
+        legend_px += 40.0 + 7.0 * static_cast<double>(chart.series[s].name.size());
     }
     return out + "</svg>\n";
 }
@@ -238,8 +262,9 @@ std::string bar_chart(const std::vector<ChartBar>& bars, const std::string& unit
             out += line_between(at, y, at, y + 13.0, "stroke=\"currentColor\" stroke-width=\"1.5\"");
             end = std::max(end, at);
         }
-        out += text_at(end + 6.0, y + 11.0, "start",
-                       fmt::format("{:.3g} {}{}", bar.value, unit, bar.flagged ? " (!)" : ""));
+        out += text_at(
+            end + 6.0, y + 11.0, "start",
+            fmt::format("{:.3g}{}{}{}", bar.value, unit.empty() ? "" : " ", unit, bar.flagged ? " (!)" : ""));
     }
     return out + "</svg>\n";
 }
@@ -277,7 +302,7 @@ std::string face_map(const std::vector<FaceDot>& dots, const std::string& unit) 
             "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"{}\" stroke=\"currentColor\" "
             "stroke-width=\"0.6\"/>\n",
             kSidePx + 30.0, py, 4.0 + 6.0 * share, shade(share));
-        out += text_at(kSidePx + 48.0, py + 4.0, "start", fmt::format("{:.3g} {}", share * most, unit));
+        out += text_at(kSidePx + 48.0, py + 4.0, "start", fmt::format("{:.2g} {}", share * most, unit));
     }
     return out + "</svg>\n";
 }

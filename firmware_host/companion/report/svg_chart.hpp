@@ -24,8 +24,9 @@ struct LineChart {
     std::string y_name;
     bool log_x = false;  // points at or under zero are left out
     bool log_y = false;
-    bool dots = true;   // a mark at every point
-    bool ends = false;  // a mark at the last point alone
+    bool from_zero = true;  // the y axis, where it is not logarithmic
+    bool dots = true;       // a mark at every point
+    bool ends = false;      // a mark at the last point alone
     // More than there are colours: all in one, thin, without a legend.
     std::vector<ChartSeries> series;
     std::optional<double> marked_x;  // what was chosen: a dashed line

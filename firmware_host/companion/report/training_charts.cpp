@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <map>
 
 namespace rig::host {
@@ -29,6 +30,7 @@ TrainingCurve width_curve(const RbfTrainingReport& report) {
                     report.width_factor, report.dimensions),
         LineChart{.x_name = "width, in distances between neighbouring references",
                   .y_name = "weight rms, left out",
+                  .from_zero = false,
                   .series = {},
                   .marked_x = report.width_factor}};
     for (auto& [dimensions, series] : by_dimensions) {
@@ -63,6 +65,17 @@ TrainingCurve dimension_curve(const RbfTrainingReport& report) {
     return out;
 }
 
+// How many paths end where the one with the least lambda does: at the bound that marker noise sets.
+std::size_t at_least_lambda(const std::vector<GcvPath>& paths) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const GcvPath& path : paths) {
+        if (!path.empty()) least = std::min(least, path.back().lambda);
+    }
+    return static_cast<std::size_t>(std::ranges::count_if(paths, [least](const GcvPath& path) {
+        return !path.empty() && path.back().lambda <= least * (1.0 + 1e-6);
+    }));
+}
+
 // Every shape's way from its first lambda to its last; GCV relative to the last, since shapes differ in
 // scale.
 TrainingCurve gcv_curve(const RbfTrainingReport& report) {
@@ -71,6 +84,8 @@ TrainingCurve gcv_curve(const RbfTrainingReport& report) {
                       LineChart{.x_name = "lambda",
                                 .y_name = "GCV over its last value",
                                 .log_x = true,
+                                .log_y = true,
+                                .dots = false,
                                 .ends = true,
                                 .series = {},
                                 .marked_x = report.median_lambda}};
@@ -84,9 +99,13 @@ TrainingCurve gcv_curve(const RbfTrainingReport& report) {
     }
     out.title = fmt::format(
         "GCV path: the ridge of every shape on its way to the minimum of generalised cross-validation, one "
-        "line a shape, a dot where it ended; at most {} steps. Lines that are all dot began at the least "
-        "lambda that the noise allows and stayed. Dashed: the median, {:.3g}.",
-        longest, report.median_lambda);
+        "line a "
+        "shape, a dot where it ended after at most {} steps. {} of {} end at the least lambda, which the "
+        "marker "
+        "noise sets; a dot far to the right is a shape of which the references tell nothing. Dashed: the "
+        "median, "
+        "{:.2g}.",
+        longest, at_least_lambda(report.gcv_paths), report.gcv_paths.size(), report.median_lambda);
     return out;
 }
 
