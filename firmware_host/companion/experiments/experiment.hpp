@@ -48,5 +48,6 @@ struct Experiment {
 [[nodiscard]] Result<ExperimentTable, FileError> deng06_variance(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> hybrid16_barycentric(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> rbf_dimensions(const std::filesystem::path& data);
+[[nodiscard]] Result<ExperimentTable, FileError> temporal_prior(const std::filesystem::path& data);
 
 }  // namespace rig::host

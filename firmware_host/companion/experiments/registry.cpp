@@ -17,6 +17,9 @@ std::span<const Experiment> all_experiments() {
                    hybrid16_barycentric},
         Experiment{"rbf-dimensions", "Deng06 section 8: how many components, in the take and across takes",
                    rbf_dimensions},
+        Experiment{"temporal-prior",
+                   "Methods 3.7: what the pull towards the previous solution costs and gives",
+                   temporal_prior},
     };
     return kExperiments;
 }

@@ -31,14 +31,14 @@ std::string optional_number(const std::optional<double>& value, int decimals) {
 
 void summary(const PackPageInput& input, Page& page) {
     const SolvePack& pack = input.pack;
-    page.table({"", ""}, {{{"solver", solver_words(pack.solver)}, false},
-                          {{"markers", std::to_string(pack.marker_count)}, false},
-                          {{"shapes", std::to_string(pack.shape_count)}, false},
-                          {{"cameras", std::to_string(pack.camera_count)}, false},
-                          {{"rate", fmt::format("{:.4g} Hz", pack.rate_hz)}, false},
-                          {{"noise of a marker coordinate", fmt::format("{:.4g} mm", pack.noise_mm)}, false},
-                          {{"sparsity", fmt::format("{:.4g} mm^2", pack.sparsity_mm2)}, false},
-                          {{"ridge", fmt::format("{:.4g} mm^2", pack.ridge_mm2)}, false}});
+    page.table({}, {{{"solver", solver_words(pack.solver)}, false},
+                    {{"markers", std::to_string(pack.marker_count)}, false},
+                    {{"shapes", std::to_string(pack.shape_count)}, false},
+                    {{"cameras", std::to_string(pack.camera_count)}, false},
+                    {{"rate", fmt::format("{:.4g} Hz", pack.rate_hz)}, false},
+                    {{"noise of a marker coordinate", fmt::format("{:.4g} mm", pack.noise_mm)}, false},
+                    {{"sparsity", fmt::format("{:.4g} mm^2", pack.sparsity_mm2)}, false},
+                    {{"ridge", fmt::format("{:.4g} mm^2", pack.ridge_mm2)}, false}});
 }
 
 void invisible(const PackPageInput& input, Page& page) {
