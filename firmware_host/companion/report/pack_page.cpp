@@ -71,7 +71,8 @@ void observability(const PackPageInput& input, Page& page) {
         "the "
         "weight before anything is seen (prior) and with every marker seen (posterior). Confidence: 1 - "
         "posterior "
-        "/ prior. Bounds and the pull towards the previous frame come on top. Least confident first.");
+        "/ prior. Bounds and the pull towards the previous frame come on top. A long column with a wide "
+        "posterior is a shape that others can imitate. Least confident first.");
     std::vector<ChartBar> bars;
     std::vector<Page::Row> rows;
     const bool measured = input.analysis.take.has_value();
@@ -118,6 +119,12 @@ void regions(const PackPageInput& input, Page& page) {
         "Predicted: rms over the region's markers of what noise and prior leave of the solved position of a "
         "marker. "
         "Regions are told by position alone.");
+    if (input.pack.solver == SolverKind::kRbf) {
+        page.paragraph(
+            "The prediction is of shapes and prior, which a regression does not solve with: its own error is "
+            "the "
+            "measured one.");
+    }
     if (analysis.take) {
         page.paragraph(
             fmt::format("Measured: {} frames of the take played on the pack's own markers with its own noise "
