@@ -9,6 +9,7 @@
 
 #include "core/base/math.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/solve/confidence.hpp"
 #include "firmware_host/companion/commands/console.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/files/csv.hpp"
@@ -16,6 +17,7 @@
 #include "firmware_host/pack_file/opened_pack.hpp"
 #include "firmware_host/settings/control_settings.hpp"
 #include "firmware_host/settings/settings_file.hpp"
+#include "firmware_host/settings/shape_selection.hpp"
 
 namespace rig::host {
 
@@ -37,21 +39,38 @@ struct SolveOptions {
     double rate_hz = 60.0;
 };
 
+// The parts of the face whose confidence is reported: those of the regions that this pack has shapes of.
+struct ReportedRegion {
+    std::string name;
+    std::vector<std::size_t> shapes;
+};
+
 // What the outputs are collected in before any file is written.
 struct SolveResults {
+    std::vector<ReportedRegion> regions;
     CsvWriter weights;
     CsvWriter report;
     NpyArray<std::int32_t> labels;
     NpyArray<float> points;
 };
 
-const std::vector<std::string>& report_columns() {
-    static const std::vector<std::string> columns{"frame",        "state",        "kkt",
-                                                  "objective",    "iterations",   "working_set_changes",
-                                                  "optimal",      "markers_used", "residual_rms_mm",
-                                                  "slip_rx_rad",  "slip_ry_rad",  "slip_rz_rad",
-                                                  "slip_tx_mm",   "slip_ty_mm",   "slip_tz_mm",
-                                                  "delay_frames", "delay_ms"};
+std::vector<ReportedRegion> reported_regions(const SolvePack& pack) {
+    std::vector<ReportedRegion> regions;
+    for (const char* name : {"brows", "lids", "cheeks", "nose", "mouth", "jaw"}) {
+        auto shapes = select_shapes(name, std::span(pack.shape_names).first(pack.shape_count));
+        if (shapes && !shapes->empty()) regions.push_back({name, std::move(*shapes)});
+    }
+    return regions;
+}
+
+std::vector<std::string> report_columns(std::span<const ReportedRegion> regions) {
+    std::vector<std::string> columns{"frame",        "state",        "kkt",
+                                     "objective",    "iterations",   "working_set_changes",
+                                     "optimal",      "markers_used", "residual_rms_mm",
+                                     "slip_rx_rad",  "slip_ry_rad",  "slip_rz_rad",
+                                     "slip_tx_mm",   "slip_ty_mm",   "slip_tz_mm",
+                                     "delay_frames", "delay_ms"};
+    for (const ReportedRegion& region : regions) columns.push_back("confidence_" + region.name);
     return columns;
 }
 
@@ -96,7 +115,8 @@ Result<void, FileError> check_stream(const SolveOptions& options, const SolvePac
                               options.markers, stream.shape[1], options.pack, pack.marker_count)});
 }
 
-void add_report_row(std::size_t frame, const FaceState& state, const FrameReport& report, CsvWriter& csv) {
+void add_report_row(std::size_t frame, const SolvePack& pack, std::span<const ReportedRegion> regions,
+                    const FaceState& state, const FrameReport& report, CsvWriter& csv) {
     csv.integer(static_cast<std::int64_t>(frame)).text(state_name(state.state));
     csv.number(report.kkt, 12).number(report.objective_mm2, 6).integer(report.iterations);
     csv.integer(report.working_set_changes).integer(report.optimal ? 1 : 0);
@@ -104,6 +124,10 @@ void add_report_row(std::size_t frame, const FaceState& state, const FrameReport
     for (const float r : state.slip.rotation_rad) csv.number(static_cast<double>(r), 7);
     for (const float t : state.slip.translation_mm) csv.number(static_cast<double>(t), 5);
     csv.integer(report.delay_frames).number(static_cast<double>(report.delay_us) * 1e-3, 3);
+    for (const ReportedRegion& region : regions) {
+        csv.number(static_cast<double>(region_confidence(pack.prior_sigma, state.confidence, region.shapes)),
+                   5);
+    }
     csv.end_row();
 }
 
@@ -115,7 +139,7 @@ void add_results(const SolveOptions& options, const SolvePack& pack, std::size_t
     for (std::size_t i = 0; i < pack.shape_count; ++i)
         results.weights.number(static_cast<double>(state.weights[i]), 6);
     results.weights.end_row();
-    add_report_row(frame, state, report, results.report);
+    add_report_row(frame, pack, results.regions, state, report, results.report);
     for (std::size_t s = 0; s < slots; ++s) results.labels.values.push_back(report.labels[s]);
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -258,7 +282,9 @@ int run_solve(const SolveOptions& command_line) {
         print_error(set.error());
         return kExitUsage;
     }
-    SolveResults results{CsvWriter(weight_columns(pack)), CsvWriter(report_columns()), {}, {}};
+    std::vector<ReportedRegion> regions = reported_regions(pack);
+    SolveResults results{{}, CsvWriter(weight_columns(pack)), CsvWriter(report_columns(regions)), {}, {}};
+    results.regions = std::move(regions);
     results.labels.shape = {stream->shape[0], stream->shape[1]};
     results.points.shape = {stream->shape[0], pack.marker_count, 3};
     install_interrupt_handler();
