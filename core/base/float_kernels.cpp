@@ -24,7 +24,28 @@ struct Wide {
 
     static const Vector& at(const Real* p) { return *reinterpret_cast<const Vector*>(p); }
     static Vector& at(Real* p) { return *reinterpret_cast<Vector*>(p); }
+
+    // Vectors that hold n elements: what the machine can skip of the padding it skips.
+    static constexpr std::size_t vectors(std::size_t n) { return (n + kLanes - 1) / kLanes; }
 };
+
+template <typename Vector>
+Vector larger(const Vector& a, const Vector& b) {  // a where either is no number
+    return a < b ? b : a;
+}
+
+template <typename Vector>
+Vector smaller(const Vector& a, const Vector& b) {
+    return b < a ? b : a;
+}
+
+// The order does not matter, so neither does the width.
+template <typename Real>
+Real largest_of(const typename Wide<Real>::Vector& v) {
+    Real largest = v[0];
+    for (std::size_t i = 1; i < Wide<Real>::kLanes; ++i) largest = largest < v[i] ? v[i] : largest;
+    return largest;
+}
 
 template <typename Real>
 struct Rows {
@@ -66,7 +87,7 @@ void strip_of(std::size_t sums, const Rows<Real>& rows, const Real* coefficient,
 template <typename Real, bool kIndexed>
 void combine(const Rows<Real>& rows, const Real* coefficient, std::size_t count, std::size_t n,
              const Real* start, Real* out) {
-    const std::size_t vectors = n / Wide<Real>::kLanes;
+    const std::size_t vectors = Wide<Real>::vectors(n);
     const std::size_t strips = (vectors + kMostSums - 1) / kMostSums;
     std::size_t done = 0;
     for (std::size_t strip = 0; strip < strips; ++strip) {
@@ -96,19 +117,76 @@ Real dot_of(const Real* a, const Real* b, std::size_t n) {
     return s[0];
 }
 
+// `kRows` neighbouring rows of the square, so that u is read once for all of them.
+template <typename Real, bool kAdd, std::size_t kRows>
+void square_rows(Real* m, std::size_t stride, std::size_t r, std::size_t vectors, const Real* u) {
+    using W = Wide<Real>;
+    Real factor[kRows];
+    for (std::size_t i = 0; i < kRows; ++i) factor[i] = kAdd ? u[r + i] : -u[r + i];
+    Real* row = m + r * stride;
+    for (std::size_t c = 0; c < vectors * W::kLanes; c += W::kLanes) {
+        const typename W::Vector v = W::at(u + c);
+        for (std::size_t i = 0; i < kRows; ++i) W::at(row + i * stride + c) += factor[i] * v;
+    }
+}
+
 // u[r] u[c] = u[c] u[r] to the bit, so a symmetric matrix stays symmetric.
 template <typename Real, bool kAdd>
 void square(Real* m, std::size_t stride, std::size_t k, const Real* u) {
+    constexpr std::size_t kTogether = 4;
+    const std::size_t vectors = Wide<Real>::vectors(k);
+    std::size_t r = 0;
+    for (; r + kTogether <= k; r += kTogether) square_rows<Real, kAdd, kTogether>(m, stride, r, vectors, u);
+    for (; r < k; ++r) square_rows<Real, kAdd, 1>(m, stride, r, vectors, u);
+}
+
+template <typename Real>
+bool inside(const Real* value, const Real* step, const Real* low, const Real* high, std::size_t n) {
     using W = Wide<Real>;
-    const std::size_t columns = padded(k);
-    for (std::size_t r = 0; r < k; ++r) {
-        Real* row = m + r * stride;
-        const Real factor = kAdd ? u[r] : -u[r];
-        for (std::size_t c = 0; c < columns; c += kLaneFloats) {
-            for (std::size_t s = 0; s < kLaneFloats; s += W::kLanes)
-                W::at(row + c + s) += factor * W::at(u + c + s);
-        }
+    using Mask = decltype(typename W::Vector{} < typename W::Vector{});
+    Mask outside{};
+    for (std::size_t c = 0; c < W::vectors(n) * W::kLanes; c += W::kLanes) {
+        const typename W::Vector aim = W::at(value + c) - W::at(step + c);
+        outside |= ~((aim >= W::at(low + c)) & (aim <= W::at(high + c)));
     }
+    const Mask none{};
+    return std::memcmp(&outside, &none, sizeof(Mask)) == 0;
+}
+
+template <typename Real>
+void move(Real* value, const Real* step, Real length, const Real* low, const Real* high, std::size_t n) {
+    using W = Wide<Real>;
+    for (std::size_t c = 0; c < W::vectors(n) * W::kLanes; c += W::kLanes) {
+        const typename W::Vector aim = W::at(value + c) - length * W::at(step + c);
+        W::at(value + c) = smaller(larger(W::at(low + c), aim), W::at(high + c));
+    }
+}
+
+template <typename Real>
+Real moves(const JacobiStep<Real>& s, std::size_t n, Real* out) {
+    using W = Wide<Real>;
+    typename W::Vector largest{};
+    for (std::size_t c = 0; c < W::vectors(n) * W::kLanes; c += W::kLanes) {
+        const typename W::Vector x = W::at(s.x + c);
+        const typename W::Vector aim = x - W::at(s.gradient + c) * W::at(s.scale + c);
+        const typename W::Vector by = x - smaller(larger(aim, W::at(s.low + c)), W::at(s.high + c));
+        const typename W::Vector size = larger(by, -by);
+        W::at(out + c) = size;
+        largest = larger(largest, size);
+    }
+    return largest_of<Real>(largest);
+}
+
+template <typename Real>
+Real largest_magnitude(const Real* a, const Real* b, std::size_t n) {
+    using W = Wide<Real>;
+    typename W::Vector largest{};
+    for (std::size_t c = 0; c < W::vectors(n) * W::kLanes; c += W::kLanes) {
+        typename W::Vector v = W::at(a + c);
+        if (b != nullptr) v *= W::at(b + c);
+        largest = larger(largest, larger(v, -v));
+    }
+    return largest_of<Real>(largest);
 }
 
 }  // namespace
@@ -150,6 +228,37 @@ void subtract_square(float* m, std::size_t stride, std::size_t k, const float* u
 }
 void subtract_square(double* m, std::size_t stride, std::size_t k, const double* u) {
     square<double, false>(m, stride, k, u);
+}
+
+bool step_inside(const float* value, const float* step, const float* low, const float* high, std::size_t n) {
+    return inside(value, step, low, high, n);
+}
+bool step_inside(const double* value, const double* step, const double* low, const double* high,
+                 std::size_t n) {
+    return inside(value, step, low, high, n);
+}
+
+void move_inside(float* value, const float* step, float length, const float* low, const float* high,
+                 std::size_t n) {
+    move(value, step, length, low, high, n);
+}
+void move_inside(double* value, const double* step, double length, const double* low, const double* high,
+                 std::size_t n) {
+    move(value, step, length, low, high, n);
+}
+
+float projected_moves(const JacobiStep<float>& step, std::size_t n, float* out) {
+    return moves(step, n, out);
+}
+double projected_moves(const JacobiStep<double>& step, std::size_t n, double* out) {
+    return moves(step, n, out);
+}
+
+float largest_product(const float* a, const float* b, std::size_t n) {
+    return largest_magnitude(a, b, n);
+}
+double largest_product(const double* a, const double* b, std::size_t n) {
+    return largest_magnitude(a, b, n);
 }
 
 }  // namespace rig

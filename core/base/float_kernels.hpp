@@ -21,7 +21,8 @@ inline constexpr std::size_t kLaneFloats = 16;  // rows are padded with zeros to
 }
 
 // out[c] = start[c] + sum_r coefficient[r] row_r[c], c in [0, n); row_r begins at rows + r stride.
-// n a multiple of kLaneFloats; `start` may be null (zero) or `out` itself; nothing else may overlap.
+// Rows hold zeros from n to padded(n) and `out` has room for padded(n), of which what lies behind n may or
+// may not be written; `start` may be null (zero) or `out` itself; nothing else may overlap.
 void combine_rows(const float* rows, std::size_t stride, const float* coefficient, std::size_t count,
                   std::size_t n, const float* start, float* out);
 void combine_rows(const double* rows, std::size_t stride, const double* coefficient, std::size_t count,
@@ -38,11 +39,43 @@ void combine_rows(const double* rows, std::size_t stride, const std::uint16_t* i
 [[nodiscard]] float padded_dot(const float* a, const float* b, std::size_t n);
 [[nodiscard]] double padded_dot(const double* a, const double* b, std::size_t n);
 
-// The symmetric k x k matrix m := m + u u^T (or m - u u^T), rows `stride` apart, over columns
-// [0, padded(k)); stays exactly symmetric.
+// The symmetric k x k matrix m := m + u u^T (or m - u u^T), rows `stride` apart, u zero from k to padded(k);
+// stays exactly symmetric.
 void add_square(float* m, std::size_t stride, std::size_t k, const float* u);
 void add_square(double* m, std::size_t stride, std::size_t k, const double* u);
 void subtract_square(float* m, std::size_t stride, std::size_t k, const float* u);
 void subtract_square(double* m, std::size_t stride, std::size_t k, const double* u);
+
+// For the arrays of the following: room for padded(n), finite numbers behind n.
+
+// Whether low <= value - step <= high everywhere in [0, padded(n)); false when one is no number.
+[[nodiscard]] bool step_inside(const float* value, const float* step, const float* low, const float* high,
+                               std::size_t n);
+[[nodiscard]] bool step_inside(const double* value, const double* step, const double* low, const double* high,
+                               std::size_t n);
+
+// value := clamp(value - length step, low, high); low where the step is no number.
+void move_inside(float* value, const float* step, float length, const float* low, const float* high,
+                 std::size_t n);
+void move_inside(double* value, const double* step, double length, const double* low, const double* high,
+                 std::size_t n);
+
+template <typename Real>
+struct JacobiStep {
+    const Real* x;
+    const Real* gradient;
+    const Real* scale;  // 1 / H_ii
+    const Real* low;
+    const Real* high;
+};
+
+// out := |x - clamp(x - scale gradient, low, high)|, no number where the step is none; returns the largest of
+// the others.
+[[nodiscard]] float projected_moves(const JacobiStep<float>& step, std::size_t n, float* out);
+[[nodiscard]] double projected_moves(const JacobiStep<double>& step, std::size_t n, double* out);
+
+// max |a[i] b[i]|, or max |a[i]| when b is null; zeros behind n. What is no number does not count.
+[[nodiscard]] float largest_product(const float* a, const float* b, std::size_t n);
+[[nodiscard]] double largest_product(const double* a, const double* b, std::size_t n);
 
 }  // namespace rig

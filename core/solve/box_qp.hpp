@@ -41,6 +41,9 @@ struct BoxQpConfig {
     // A point counts as optimal when a projected Jacobi step moves no variable by more than this, relative to
     // the largest |w_i|, or to 1 (float) or 0.01 (double) when all are smaller.
     double tolerance = 1e-6;
+    // For problems whose weights the data do not tell apart: a variable also stays at its bound while leaving
+    // it could lower the objective by no more than this share of |objective|, by the curvature H_ii. 0: off.
+    double objective_share = 0.0;
 };
 
 // Which variables sit at a bound, and the inverse of H over the others; kept from frame to frame.
@@ -52,14 +55,25 @@ struct BoxQpState {
 
     bool warm = false;  // false: the next solve starts from its weights alone
     bool inverse_valid = false;
+    bool settled = false;  // what is kept below belongs to `answer` in these bounds
     std::uint32_t hessian_version = 0;
-    std::uint16_t size = 0;        // N
-    std::uint16_t free_count = 0;  // k
+    std::uint16_t size = 0;          // N
+    std::uint16_t free_count = 0;    // k
+    std::uint16_t pinned_count = 0;  // variables that are not free and not zero
     std::array<Where, kMaxUnknowns> where{};
     std::array<std::uint16_t, kMaxUnknowns> free{};        // [k], in the order of the inverse's rows
+    std::array<std::uint16_t, kMaxUnknowns> pinned{};      // in no order
     alignas(64) std::array<Real, kMaxUnknowns> answer{};   // w of the last solve
     alignas(64) std::array<Real, kMaxUnknowns> product{};  // H answer
     alignas(64) std::array<Real, kMaxUnknowns> scale{};    // 1 / H_ii
+    alignas(64) std::array<Real, kMaxUnknowns> low{};
+    alignas(64) std::array<Real, kMaxUnknowns> high{};
+    alignas(64) std::array<Real, kMaxUnknowns> open{};  // 1 where the variable may be freed, else 0
+    // Of the free variables, in the order of the inverse's rows; zeros beyond.
+    alignas(64) std::array<Real, kMaxUnknowns> value{};
+    alignas(64) std::array<Real, kMaxUnknowns> free_low{};
+    alignas(64) std::array<Real, kMaxUnknowns> free_high{};
+    alignas(64) std::array<Real, kMaxUnknowns> free_scale{};
     alignas(64) std::array<Real, kMaxUnknowns * kInverseStride> inverse{};  // [k x k], zeros beyond
 };
 
@@ -68,13 +82,7 @@ struct BoxQpWorkspace {
     alignas(64) std::array<Real, kMaxUnknowns> gradient{};       // H w + q
     alignas(64) std::array<Real, kMaxUnknowns> free_gradient{};  // [k], as the inverse's rows
     alignas(64) std::array<Real, kMaxUnknowns> step{};           // [k] inverse free_gradient
-    // Of the free variables, in the order of the inverse's rows.
-    alignas(64) std::array<Real, kMaxUnknowns> value{};
-    alignas(64) std::array<Real, kMaxUnknowns> free_low{};
-    alignas(64) std::array<Real, kMaxUnknowns> free_high{};
-    // Of all: 1 where the variable may rise (fall) off the bound it sits at, else 0.
-    alignas(64) std::array<Real, kMaxUnknowns> may_rise{};
-    alignas(64) std::array<Real, kMaxUnknowns> may_fall{};
+    alignas(64) std::array<Real, kMaxUnknowns> moves{};          // of a projected Jacobi step
     alignas(64) std::array<Real, kMaxUnknowns> column{};
     alignas(64) std::array<Real, kMaxUnknowns> direction{};
     alignas(64) std::array<Real, kMaxUnknowns> moving{};
@@ -88,7 +96,9 @@ struct BoxQpReport {
     std::uint16_t rebuilds = 0;    // of the inverse, from nothing
     double kkt = 0.0;  // max_i |w_i - clamp(w_i - g_i / H_ii)|: the projected Jacobi step's largest move
     double objective = 0.0;  // 1/2 w^T H w + q^T w
-    bool optimal = false;    // kkt within ten tolerances; false: stopped at the cap, or worn out
+    double foregone = 0.0;   // what the variables that objective_share kept could lower it by, one at a time
+    // kkt within ten tolerances, or but for those variables; false: stopped at the cap, or worn out.
+    bool optimal = false;
 };
 
 // On entry `w` holds a start (any numbers; clamped), on return the answer, finite and inside the bounds for
