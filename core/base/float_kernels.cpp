@@ -1,6 +1,7 @@
 #include "core/base/float_kernels.hpp"
 
 #include <cstring>
+#include <limits>
 
 namespace rig {
 
@@ -109,9 +110,12 @@ Real dot_of(const Real* a, const Real* b, std::size_t n) {
         for (std::size_t s = 0; s < kParts; ++s)
             sum[s] += W::at(a + i + s * W::kLanes) * W::at(b + i + s * W::kLanes);
     }
-    Real s[kLaneFloats];
+    for (std::size_t half = kParts / 2; half > 0; half /= 2) {
+        for (std::size_t i = 0; i < half; ++i) sum[i] += sum[i + half];
+    }
+    Real s[W::kLanes];
     std::memcpy(s, sum, sizeof(s));
-    for (std::size_t half = kLaneFloats / 2; half > 0; half /= 2) {
+    for (std::size_t half = W::kLanes / 2; half > 0; half /= 2) {
         for (std::size_t i = 0; i < half; ++i) s[i] += s[i + half];
     }
     return s[0];
@@ -141,24 +145,34 @@ void square(Real* m, std::size_t stride, std::size_t k, const Real* u) {
 }
 
 template <typename Real>
-bool inside(const Real* value, const Real* step, const Real* low, const Real* high, std::size_t n) {
+Real room(const BoxedStep<Real>& s, std::size_t n, Real* out) {
     using W = Wide<Real>;
-    using Mask = decltype(typename W::Vector{} < typename W::Vector{});
-    Mask outside{};
+    using Vector = typename W::Vector;
+    const Vector none{};
+    const Vector endless = none + std::numeric_limits<Real>::infinity();
+    Vector least = endless;
     for (std::size_t c = 0; c < W::vectors(n) * W::kLanes; c += W::kLanes) {
-        const typename W::Vector aim = W::at(value + c) - W::at(step + c);
-        outside |= ~((aim >= W::at(low + c)) & (aim <= W::at(high + c)));
+        const Vector value = W::at(s.value + c);
+        const Vector step = W::at(s.step + c);
+        const Vector low = W::at(s.low + c);
+        const Vector high = W::at(s.high + c);
+        const Vector aim = value - step;
+        const Vector share = larger(none, (value - (step > none ? low : high)) / step);
+        const Vector length = (aim >= low) & (aim <= high) ? endless : share;
+        W::at(out + c) = length;
+        least = smaller(least, length);
     }
-    const Mask none{};
-    return std::memcmp(&outside, &none, sizeof(Mask)) == 0;
+    Real all = least[0];
+    for (std::size_t i = 1; i < W::kLanes; ++i) all = least[i] < all ? least[i] : all;
+    return all;
 }
 
 template <typename Real>
-void move(Real* value, const Real* step, Real length, const Real* low, const Real* high, std::size_t n) {
+void move(const BoxedStep<Real>& s, Real length, std::size_t n, Real* out) {
     using W = Wide<Real>;
     for (std::size_t c = 0; c < W::vectors(n) * W::kLanes; c += W::kLanes) {
-        const typename W::Vector aim = W::at(value + c) - length * W::at(step + c);
-        W::at(value + c) = smaller(larger(W::at(low + c), aim), W::at(high + c));
+        const typename W::Vector aim = W::at(s.value + c) - length * W::at(s.step + c);
+        W::at(out + c) = smaller(larger(W::at(s.low + c), aim), W::at(s.high + c));
     }
 }
 
@@ -230,21 +244,18 @@ void subtract_square(double* m, std::size_t stride, std::size_t k, const double*
     square<double, false>(m, stride, k, u);
 }
 
-bool step_inside(const float* value, const float* step, const float* low, const float* high, std::size_t n) {
-    return inside(value, step, low, high, n);
+float room_ahead(const BoxedStep<float>& step, std::size_t n, float* out) {
+    return room(step, n, out);
 }
-bool step_inside(const double* value, const double* step, const double* low, const double* high,
-                 std::size_t n) {
-    return inside(value, step, low, high, n);
+double room_ahead(const BoxedStep<double>& step, std::size_t n, double* out) {
+    return room(step, n, out);
 }
 
-void move_inside(float* value, const float* step, float length, const float* low, const float* high,
-                 std::size_t n) {
-    move(value, step, length, low, high, n);
+void move_inside(const BoxedStep<float>& step, float length, std::size_t n, float* out) {
+    move(step, length, n, out);
 }
-void move_inside(double* value, const double* step, double length, const double* low, const double* high,
-                 std::size_t n) {
-    move(value, step, length, low, high, n);
+void move_inside(const BoxedStep<double>& step, double length, std::size_t n, double* out) {
+    move(step, length, n, out);
 }
 
 float projected_moves(const JacobiStep<float>& step, std::size_t n, float* out) {

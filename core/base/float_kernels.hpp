@@ -48,17 +48,22 @@ void subtract_square(double* m, std::size_t stride, std::size_t k, const double*
 
 // For the arrays of the following: room for padded(n), finite numbers behind n.
 
-// Whether low <= value - step <= high everywhere in [0, padded(n)); false when one is no number.
-[[nodiscard]] bool step_inside(const float* value, const float* step, const float* low, const float* high,
-                               std::size_t n);
-[[nodiscard]] bool step_inside(const double* value, const double* step, const double* low, const double* high,
-                               std::size_t n);
+template <typename Real>
+struct BoxedStep {
+    const Real* value;  // between low and high
+    const Real* step;   // taken away from value
+    const Real* low;
+    const Real* high;
+};
 
-// value := clamp(value - length step, low, high); low where the step is no number.
-void move_inside(float* value, const float* step, float length, const float* low, const float* high,
-                 std::size_t n);
-void move_inside(double* value, const double* step, double length, const double* low, const double* high,
-                 std::size_t n);
+// out := the share of the step after which a value meets its bound, at least 0, infinite where the whole step
+// stays inside; returns the least of them.
+[[nodiscard]] float room_ahead(const BoxedStep<float>& step, std::size_t n, float* out);
+[[nodiscard]] double room_ahead(const BoxedStep<double>& step, std::size_t n, double* out);
+
+// out := clamp(value - length step, low, high); low where the step is no number. `out` may be `value`.
+void move_inside(const BoxedStep<float>& step, float length, std::size_t n, float* out);
+void move_inside(const BoxedStep<double>& step, double length, std::size_t n, double* out);
 
 template <typename Real>
 struct JacobiStep {

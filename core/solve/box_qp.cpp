@@ -17,6 +17,9 @@ constexpr double kRoughly = 1e3;    // tolerances: a face solved this well tells
 constexpr double kReleaseShare =
     0.25;  // of the largest wrong multiplier; smaller ones wait for the next round
 constexpr std::size_t kReleaseAtOnce = 8;
+constexpr std::uint16_t kFacesUnwatched = 16;
+constexpr std::uint16_t kIdleFaces =
+    3;  // in a row without descent: the inverse is made anew, or that was all
 
 // Weights smaller than this are judged as if they were this large: in float, multipliers carry the rounding
 // of terms of about 1.
@@ -80,11 +83,10 @@ class FaceWalk {
     bool step_descends();
     [[nodiscard]] Real free_residual() const;
     bool walk();
-    [[nodiscard]] Real length_to_bound(std::size_t& blocking) const;
     bool next_face();
+    bool stagnates();
     bool release();
     std::size_t choose_candidates();
-    void drop_idle();
     bool rebuild_once();
     void rebuild();
     void fix(std::size_t slot, Where where);
@@ -104,13 +106,15 @@ class FaceWalk {
     Real tolerance_;                                              // of weights, see BoxQpConfig
     Real last_residual_ = std::numeric_limits<Real>::infinity();  // after the last full step on this face
     Real largest_move_ = Real(0);
-    bool moved_ = true;       // since the last release
-    bool has_step_ = false;   // ws_.step belongs to ws_.free_gradient
-    bool fresh_ = false;      // ws_.gradient belongs to the answer
-    bool has_moves_ = false;  // ws_.moves belongs to ws_.gradient
-    bool skipped_ = false;    // a variable is closed that another start may free
-    bool repaired_ = false;   // the inverse was made anew because it had worn out
-    bool finished_ = false;   // no variable asks to be freed, and the face is solved
+    double least_objective_ = std::numeric_limits<double>::infinity();
+    std::uint16_t faces_ = 0;       // solved
+    std::uint16_t idle_faces_ = 0;  // since the objective last fell
+    bool moved_ = true;             // since the last release
+    bool has_step_ = false;         // ws_.step belongs to ws_.free_gradient
+    bool fresh_ = false;            // ws_.gradient belongs to the answer
+    bool has_moves_ = false;        // ws_.moves belongs to ws_.gradient
+    bool skipped_ = false;          // a variable is closed that another start may free
+    bool repaired_ = false;         // the inverse was made anew because it had worn out
 };
 
 // Where the start itself says: a state of other weights must not move them.
@@ -284,39 +288,25 @@ Real FaceWalk<Real>::free_residual() const {
 template <typename Real>
 bool FaceWalk<Real>::walk() {
     const std::size_t k = free_.count();
-    Real* value = s_.value.data();
-    const Real* low = s_.free_low.data();
-    const Real* high = s_.free_high.data();
+    Real* room = ws_.direction.data();
     fresh_ = false;
-    std::size_t blocking = kNone;
-    const Real length =
-        step_inside(value, ws_.step.data(), low, high, k) ? Real(1) : length_to_bound(blocking);
-    move_inside(value, ws_.step.data(), length, low, high, k);
+    const Real least =
+        room_ahead({s_.value.data(), ws_.step.data(), s_.free_low.data(), s_.free_high.data()}, k, room);
+    const Real length = std::min(least, Real(1));
+    move_inside({s_.value.data(), ws_.step.data(), s_.free_low.data(), s_.free_high.data()}, length, k,
+                s_.value.data());
     moved_ = moved_ || length > Real(0);
-    if (blocking == kNone) return true;
+    if (!(least <= Real(1))) return true;
+    std::size_t blocking = 0;
+    while (room[blocking] != least) ++blocking;
     const Where where = ws_.step[blocking] < Real(0) ? Where::kHigh : Where::kLow;
     const Real left = Real(1) - length;
-    for (std::size_t a = 0; a < k; ++a) {
+    for (std::size_t a = 0; a < padded(k); ++a) {
         ws_.free_gradient[a] *= left;
         ws_.step[a] *= left;
     }
     fix(blocking, where);
     return false;
-}
-
-// The share of the step after which the first variable, `blocking`, meets its bound.
-template <typename Real>
-Real FaceWalk<Real>::length_to_bound(std::size_t& blocking) const {
-    Real length(1);
-    for (std::size_t a = 0; a < free_.count(); ++a) {
-        const Real d = -ws_.step[a];
-        const Real aim = s_.value[a] + length * d;
-        if (aim >= s_.free_low[a] && aim <= s_.free_high[a]) continue;
-        const Real room = (d > Real(0) ? s_.free_high[a] : s_.free_low[a]) - s_.value[a];
-        length = std::clamp(room / d, Real(0), length);
-        blocking = a;
-    }
-    return length;
 }
 
 template <typename Real>
@@ -333,6 +323,10 @@ void FaceWalk<Real>::fix(std::size_t slot, Where where) {
 // After a full step: leaves the face where a multiplier has the wrong sign, sharpens its minimum, or is done.
 template <typename Real>
 bool FaceWalk<Real>::next_face() {
+    if (stagnates()) {
+        idle_faces_ = 0;
+        return rebuild_once();
+    }
     const Real residual = free_residual();
     const bool contracting = residual < Real(0.5) * last_residual_;
     last_residual_ = residual;
@@ -344,8 +338,7 @@ bool FaceWalk<Real>::next_face() {
         if (residual <= tolerance_) {
             const Real before = tolerance_;
             scale_tolerance();
-            finished_ = !(tolerance_ < Real(0.5) * before);
-            return !finished_;  // or the weights have shrunk since: look closer
+            return tolerance_ < Real(0.5) * before;  // the weights have shrunk since: look closer
         }
     }
     if (contracting) return true;
@@ -353,15 +346,26 @@ bool FaceWalk<Real>::next_face() {
     return rebuild_once();
 }
 
+// Whether the objective has stopped falling: what multipliers still say is rounding, and following them would
+// go round in circles. Most solves end before this is worth its cost.
+template <typename Real>
+bool FaceWalk<Real>::stagnates() {
+    if (++faces_ <= kFacesUnwatched) return false;
+    const double now = objective();
+    const double resolution = 2.0 * static_cast<double>(std::numeric_limits<Real>::epsilon());
+    const bool falls = now < least_objective_ - resolution * std::fabs(now);
+    least_objective_ = std::min(least_objective_, now);
+    idle_faces_ = falls ? 0 : static_cast<std::uint16_t>(idle_faces_ + 1);
+    return idle_faces_ >= kIdleFaces;
+}
+
 // The variables to free next, the one that pulls most first. When the last round moved nothing, that one
 // only: it cannot be blocked at once, and so rounds do not repeat.
 template <typename Real>
 std::size_t FaceWalk<Real>::choose_candidates() {
     find_moves();
-    report_.foregone = 0.0;
     if (!(largest_move_ > tolerance_)) return 0;
     for (std::size_t i = 0; i < padded(p_.size); ++i) ws_.moving[i] = ws_.moves[i] * s_.open[i];
-    if (config_.objective_share > 0.0) drop_idle();
     const Real largest = largest_product(ws_.moving.data(), nullptr, p_.size);
     if (!(largest > tolerance_)) return 0;
     const Real least = moved_ ? std::max(tolerance_, static_cast<Real>(kReleaseShare) * largest) : largest;
@@ -374,19 +378,6 @@ std::size_t FaceWalk<Real>::choose_candidates() {
     }
     std::swap(ws_.candidates[0], ws_.candidates[best]);
     return moved_ ? std::min(count, kReleaseAtOnce) : 1;
-}
-
-// Keeps at their bounds those who could not lower the objective by a share that matters.
-template <typename Real>
-void FaceWalk<Real>::drop_idle() {
-    const double size = std::fabs(objective());
-    const Real least = static_cast<Real>(2.0 * config_.objective_share * size);
-    for (std::size_t i = 0; i < p_.size; ++i) {
-        const Real gain = ws_.gradient[i] * ws_.gradient[i] * s_.scale[i];
-        if (!(ws_.moving[i] > Real(0)) || !(gain < least)) continue;
-        ws_.moving[i] = Real(0);
-        report_.foregone += 0.5 * static_cast<double>(gain);
-    }
 }
 
 // Frees variables whose multipliers have the wrong sign; false when there are none. Several at once keep the
@@ -477,8 +468,8 @@ bool FaceWalk<Real>::slide(std::size_t i) {
         return false;
     }
     const bool to_high = blocking != kNone && -sign * ws_.column[blocking] > Real(0);
-    move_inside(s_.value.data(), ws_.column.data(), sign * length, s_.free_low.data(), s_.free_high.data(),
-                free_.count());
+    move_inside({s_.value.data(), ws_.column.data(), s_.free_low.data(), s_.free_high.data()}, sign * length,
+                free_.count(), s_.value.data());
     s_.answer[i] = std::clamp(s_.answer[i] + sign * length, s_.low[i], s_.high[i]);
     moved_ = moved_ || length > Real(0);
     if (length > Real(0)) set_where(i, Where::kHeld);
@@ -536,8 +527,7 @@ void FaceWalk<Real>::certify() {
     }
     report_.kkt = sound != 0 ? static_cast<double>(largest_move_) : std::numeric_limits<double>::max();
     report_.objective = sound != 0 ? objective() : 0.0;
-    const bool kept_back = finished_ && report_.foregone > 0.0;
-    report_.optimal = sound != 0 && (kept_back || report_.kkt <= kAccepted * static_cast<double>(tolerance_));
+    report_.optimal = report_.kkt <= kAccepted * static_cast<double>(tolerance_);
     s_.settled = !skipped_;
     if (sound == 0) s_.warm = false;  // nothing of this is worth keeping
 }

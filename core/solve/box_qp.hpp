@@ -41,9 +41,6 @@ struct BoxQpConfig {
     // A point counts as optimal when a projected Jacobi step moves no variable by more than this, relative to
     // the largest |w_i|, or to 1 (float) or 0.01 (double) when all are smaller.
     double tolerance = 1e-6;
-    // For problems whose weights the data do not tell apart: a variable also stays at its bound while leaving
-    // it could lower the objective by no more than this share of |objective|, by the curvature H_ii. 0: off.
-    double objective_share = 0.0;
 };
 
 // Which variables sit at a bound, and the inverse of H over the others; kept from frame to frame.
@@ -96,9 +93,7 @@ struct BoxQpReport {
     std::uint16_t rebuilds = 0;    // of the inverse, from nothing
     double kkt = 0.0;  // max_i |w_i - clamp(w_i - g_i / H_ii)|: the projected Jacobi step's largest move
     double objective = 0.0;  // 1/2 w^T H w + q^T w
-    double foregone = 0.0;   // what the variables that objective_share kept could lower it by, one at a time
-    // kkt within ten tolerances, or but for those variables; false: stopped at the cap, or worn out.
-    bool optimal = false;
+    bool optimal = false;    // kkt within ten tolerances; false: stopped at the cap, or worn out
 };
 
 // On entry `w` holds a start (any numbers; clamped), on return the answer, finite and inside the bounds for
