@@ -46,7 +46,7 @@ void add_square(double* m, std::size_t stride, std::size_t k, const double* u);
 void subtract_square(float* m, std::size_t stride, std::size_t k, const float* u);
 void subtract_square(double* m, std::size_t stride, std::size_t k, const double* u);
 
-// For the arrays of the following: room for padded(n), finite numbers behind n.
+// The arrays of the following have room for padded(n), zeros behind n.
 
 template <typename Real>
 struct BoxedStep {

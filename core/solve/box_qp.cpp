@@ -47,12 +47,12 @@ class FaceWalk {
           s_(state),
           ws_(workspace),
           w_(w),
-          free_(problem, state, workspace),
+          free_(problem, state, workspace, report_.work),
           tolerance_(static_cast<Real>(config.tolerance)) {}
 
     BoxQpReport run() {
         adopt_start();
-        while (report_.iterations < config_.iteration_cap) {
+        while (report_.iterations < config_.iteration_cap && !spent()) {
             ++report_.iterations;
             if (!step_descends()) {  // the inverse is worn out
                 if (!rebuild_once()) break;
@@ -67,6 +67,7 @@ class FaceWalk {
     }
 
   private:
+    [[nodiscard]] bool spent() const { return report_.work >= box_qp_work_budget(p_.size); }
     [[nodiscard]] Real diagonal(std::size_t i) const { return p_.hessian[i * p_.stride + i]; }
 
     void adopt_start();
@@ -101,8 +102,8 @@ class FaceWalk {
     State& s_;
     BoxQpWorkspace<Real>& ws_;
     std::span<Real> w_;
-    FreeBlock<Real> free_;
     BoxQpReport report_;
+    FreeBlock<Real> free_;
     Real tolerance_;                                              // of weights, see BoxQpConfig
     Real last_residual_ = std::numeric_limits<Real>::infinity();  // after the last full step on this face
     Real largest_move_ = Real(0);
@@ -248,6 +249,7 @@ void FaceWalk<Real>::refresh_gradient() {
     }
     std::copy_n(p_.linear.begin(), p_.size, ws_.gradient.begin());
     for (std::size_t i = p_.size; i < padded(p_.size); ++i) ws_.gradient[i] = Real(0);
+    report_.work += count * p_.size;
     combine_rows(p_.hessian.data(), p_.stride, ws_.index.data(), ws_.moving.data(), count, p_.size,
                  ws_.gradient.data(), ws_.gradient.data());
     free_.gather_gradient();
@@ -384,7 +386,7 @@ std::size_t FaceWalk<Real>::choose_candidates() {
 // descent: the free gradient is nearly zero and each of them pulls inwards.
 template <typename Real>
 bool FaceWalk<Real>::release() {
-    for (std::size_t tries = 0; tries <= p_.size; ++tries) {
+    for (std::size_t tries = 0; tries <= p_.size && !spent(); ++tries) {
         const std::size_t count = choose_candidates();
         if (count == 0) return false;
         moved_ = false;

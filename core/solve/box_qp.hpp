@@ -91,13 +91,23 @@ struct BoxQpReport {
     std::uint16_t iterations = 0;  // steps taken
     std::uint16_t changes = 0;     // of the working set
     std::uint16_t rebuilds = 0;    // of the inverse, from nothing
+    std::uint64_t work = 0;        // multiply-adds of passes over H and the inverse
     double kkt = 0.0;  // max_i |w_i - clamp(w_i - g_i / H_ii)|: the projected Jacobi step's largest move
     double objective = 0.0;  // 1/2 w^T H w + q^T w
     bool optimal = false;    // kkt within ten tolerances; false: stopped at the cap, or worn out
 };
 
+// A solve begins no further step once it has done this many multiply-adds,
+[[nodiscard]] constexpr std::uint64_t box_qp_work_budget(std::uint64_t n) {
+    return (n + 1) * (n + 1) * (2 * (n + 1) + 512);
+}
+// and never does more than this: the last step may free eight variables and make the inverse anew.
+[[nodiscard]] constexpr std::uint64_t box_qp_work_cap(std::uint64_t n) {
+    return box_qp_work_budget(n) + (n + 1) * (n + 1) * (n + 1 + 32);
+}
+
 // On entry `w` holds a start (any numbers; clamped), on return the answer, finite and inside the bounds for
-// finite H and q. Bounded work: iteration_cap steps and one rebuild.
+// finite H and q. Bounded: iteration_cap steps and box_qp_work_cap(N) multiply-adds.
 [[nodiscard]] BoxQpReport solve_box_qp(const BoxQpProblem<float>& problem, const BoxQpConfig& config,
                                        BoxQpState<float>& state, BoxQpWorkspace<float>& workspace,
                                        std::span<float> w);

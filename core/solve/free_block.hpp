@@ -19,8 +19,10 @@ inline constexpr Real kLeastDiagonal = sizeof(Real) == 4 ? Real(1e-12) : Real(1e
 template <typename Real>
 class FreeBlock {
   public:
-    FreeBlock(const BoxQpProblem<Real>& problem, BoxQpState<Real>& state, BoxQpWorkspace<Real>& workspace)
-        : p_(problem), s_(state), ws_(workspace) {}
+    // work: counts the multiply-adds.
+    FreeBlock(const BoxQpProblem<Real>& problem, BoxQpState<Real>& state, BoxQpWorkspace<Real>& workspace,
+              std::uint64_t& work)
+        : p_(problem), s_(state), ws_(workspace), work_(work) {}
 
     [[nodiscard]] std::size_t count() const { return s_.free_count; }
 
@@ -36,6 +38,7 @@ class FreeBlock {
     // step := inverse free_gradient.
     void find_step() {
         const std::size_t k = count();
+        work_ += k * k;
         combine_rows(s_.inverse.data(), kStride, ws_.free_gradient.data(), k, k, nullptr, ws_.step.data());
         for (std::size_t a = k; a < padded(k); ++a) ws_.step[a] = Real(0);
     }
@@ -58,6 +61,7 @@ class FreeBlock {
             ws_.step[a] += u * (pull * scale);
             ws_.column[a] = u * root;
         }
+        work_ += (k + 1) * (k + 1);
         add_square(s_.inverse.data(), kStride, k + 1, ws_.column.data());
         ws_.free_gradient[k] = ws_.gradient[i];
         place(k, i, x);
@@ -78,6 +82,7 @@ class FreeBlock {
             ws_.step[a] -= u * pull;
             ws_.column[a] = u * root;
         }
+        work_ += k * k;
         subtract_square(s_.inverse.data(), kStride, k, ws_.column.data());
         if (slot != last) {
             std::copy_n(row(last), last, row(slot));
@@ -137,6 +142,7 @@ class FreeBlock {
         const Real* from = p_.hessian.data() + i * p_.stride;
         for (std::size_t a = 0; a < k; ++a) ws_.direction[a] = from[s_.free[a]];
         for (std::size_t a = k; a < padded(k); ++a) ws_.direction[a] = ws_.column[a] = Real(0);
+        work_ += k * k;
         combine_rows(s_.inverse.data(), kStride, ws_.direction.data(), k, k, nullptr, ws_.column.data());
         return from[i] - padded_dot(ws_.direction.data(), ws_.column.data(), padded(k));
     }
@@ -144,6 +150,7 @@ class FreeBlock {
     const BoxQpProblem<Real>& p_;
     BoxQpState<Real>& s_;
     BoxQpWorkspace<Real>& ws_;
+    std::uint64_t& work_;
 };
 
 }  // namespace rig

@@ -91,6 +91,7 @@ void run_quadratic(const SolverConfig& config, SolverState& state, QuadraticStat
     report.kkt = qp.kkt;
     report.iterations = qp.iterations;
     report.changes = qp.changes;
+    report.work += qp.work;
     report.objective_mm2 = 2.0 * qp.objective + w.equations.constant_mm2;
 }
 
@@ -149,6 +150,7 @@ void solve_in(const SolverConfig& config, const NormalTables<Real>& tables, cons
     const std::size_t n = pack.shape_count;
     build_normal_equations(pack, tables, input, quadratic.normal, quadratic.qp, own.equations);
     report.markers_used = static_cast<std::uint16_t>(own.equations.markers_used);
+    report.work = own.equations.work;
     update_confidence(config, quadratic.normal, own.equations.changed, state, w);
     output.confidence = state.confidence;
     if (!enough) {

@@ -83,6 +83,7 @@ struct SolverReport {
     std::uint16_t iterations = 0;
     std::uint16_t changes = 0;  // of the working set
     std::uint16_t markers_used = 0;
+    std::uint64_t work = 0;  // multiply-adds; at most normal_work_cap(m, N) + box_qp_work_cap(N)
     double residual_rms_mm = 0.0;
     double hull_distance = 0.0;  // RBF: distance to the nearest centre, in that centre's widths
 };
