@@ -1,6 +1,7 @@
 #include "core/base/float_kernels.hpp"
 
 #include <cstring>
+#include <limits>
 
 namespace rig {
 
@@ -24,7 +25,28 @@ struct Wide {
 
     static const Vector& at(const Real* p) { return *reinterpret_cast<const Vector*>(p); }
     static Vector& at(Real* p) { return *reinterpret_cast<Vector*>(p); }
+
+    // Vectors that hold n elements: what the machine can skip of the padding it skips.
+    static constexpr std::size_t vectors(std::size_t n) { return (n + kLanes - 1) / kLanes; }
 };
+
+template <typename Vector>
+Vector larger(const Vector& a, const Vector& b) {  // a where either is no number
+    return a < b ? b : a;
+}
+
+template <typename Vector>
+Vector smaller(const Vector& a, const Vector& b) {
+    return b < a ? b : a;
+}
+
+// The order does not matter, so neither does the width.
+template <typename Real>
+Real largest_of(const typename Wide<Real>::Vector& v) {
+    Real largest = v[0];
+    for (std::size_t i = 1; i < Wide<Real>::kLanes; ++i) largest = largest < v[i] ? v[i] : largest;
+    return largest;
+}
 
 template <typename Real>
 struct Rows {
@@ -66,7 +88,7 @@ void strip_of(std::size_t sums, const Rows<Real>& rows, const Real* coefficient,
 template <typename Real, bool kIndexed>
 void combine(const Rows<Real>& rows, const Real* coefficient, std::size_t count, std::size_t n,
              const Real* start, Real* out) {
-    const std::size_t vectors = n / Wide<Real>::kLanes;
+    const std::size_t vectors = Wide<Real>::vectors(n);
     const std::size_t strips = (vectors + kMostSums - 1) / kMostSums;
     std::size_t done = 0;
     for (std::size_t strip = 0; strip < strips; ++strip) {
@@ -88,27 +110,97 @@ Real dot_of(const Real* a, const Real* b, std::size_t n) {
         for (std::size_t s = 0; s < kParts; ++s)
             sum[s] += W::at(a + i + s * W::kLanes) * W::at(b + i + s * W::kLanes);
     }
-    Real s[kLaneFloats];
+    for (std::size_t half = kParts / 2; half > 0; half /= 2) {
+        for (std::size_t i = 0; i < half; ++i) sum[i] += sum[i + half];
+    }
+    Real s[W::kLanes];
     std::memcpy(s, sum, sizeof(s));
-    for (std::size_t half = kLaneFloats / 2; half > 0; half /= 2) {
+    for (std::size_t half = W::kLanes / 2; half > 0; half /= 2) {
         for (std::size_t i = 0; i < half; ++i) s[i] += s[i + half];
     }
     return s[0];
 }
 
+// `kRows` neighbouring rows of the square, so that u is read once for all of them.
+template <typename Real, bool kAdd, std::size_t kRows>
+void square_rows(Real* m, std::size_t stride, std::size_t r, std::size_t vectors, const Real* u) {
+    using W = Wide<Real>;
+    Real factor[kRows];
+    for (std::size_t i = 0; i < kRows; ++i) factor[i] = kAdd ? u[r + i] : -u[r + i];
+    Real* row = m + r * stride;
+    for (std::size_t c = 0; c < vectors * W::kLanes; c += W::kLanes) {
+        const typename W::Vector v = W::at(u + c);
+        for (std::size_t i = 0; i < kRows; ++i) W::at(row + i * stride + c) += factor[i] * v;
+    }
+}
+
 // u[r] u[c] = u[c] u[r] to the bit, so a symmetric matrix stays symmetric.
 template <typename Real, bool kAdd>
 void square(Real* m, std::size_t stride, std::size_t k, const Real* u) {
+    constexpr std::size_t kTogether = 4;
+    const std::size_t vectors = Wide<Real>::vectors(k);
+    std::size_t r = 0;
+    for (; r + kTogether <= k; r += kTogether) square_rows<Real, kAdd, kTogether>(m, stride, r, vectors, u);
+    for (; r < k; ++r) square_rows<Real, kAdd, 1>(m, stride, r, vectors, u);
+}
+
+template <typename Real>
+Real room(const BoxedStep<Real>& s, std::size_t n, Real* out) {
     using W = Wide<Real>;
-    const std::size_t columns = padded(k);
-    for (std::size_t r = 0; r < k; ++r) {
-        Real* row = m + r * stride;
-        const Real factor = kAdd ? u[r] : -u[r];
-        for (std::size_t c = 0; c < columns; c += kLaneFloats) {
-            for (std::size_t s = 0; s < kLaneFloats; s += W::kLanes)
-                W::at(row + c + s) += factor * W::at(u + c + s);
-        }
+    using Vector = typename W::Vector;
+    const Vector none{};
+    const Vector endless = none + std::numeric_limits<Real>::infinity();
+    Vector least = endless;
+    for (std::size_t c = 0; c < W::vectors(n) * W::kLanes; c += W::kLanes) {
+        const Vector value = W::at(s.value + c);
+        const Vector step = W::at(s.step + c);
+        const Vector low = W::at(s.low + c);
+        const Vector high = W::at(s.high + c);
+        const Vector aim = value - step;
+        const Vector share = larger(none, (value - (step > none ? low : high)) / step);
+        const Vector length = (aim >= low) & (aim <= high) ? endless : share;
+        W::at(out + c) = length;
+        least = smaller(least, length);
     }
+    Real all = least[0];
+    for (std::size_t i = 1; i < W::kLanes; ++i) all = least[i] < all ? least[i] : all;
+    return all;
+}
+
+template <typename Real>
+void move(const BoxedStep<Real>& s, Real length, std::size_t n, Real* out) {
+    using W = Wide<Real>;
+    for (std::size_t c = 0; c < W::vectors(n) * W::kLanes; c += W::kLanes) {
+        const typename W::Vector aim = W::at(s.value + c) - length * W::at(s.step + c);
+        W::at(out + c) = smaller(larger(W::at(s.low + c), aim), W::at(s.high + c));
+    }
+}
+
+template <typename Real>
+Real moves(const JacobiStep<Real>& s, std::size_t n, Real* out) {
+    using W = Wide<Real>;
+    typename W::Vector largest{};
+    for (std::size_t c = 0; c < W::vectors(n) * W::kLanes; c += W::kLanes) {
+        const typename W::Vector x = W::at(s.x + c);
+        const typename W::Vector aim = x - W::at(s.gradient + c) * W::at(s.scale + c);
+        const typename W::Vector by = x - smaller(larger(aim, W::at(s.low + c)), W::at(s.high + c));
+        const typename W::Vector size = larger(by, -by);
+        W::at(out + c) = size;
+        largest = larger(largest, size);
+    }
+    return largest_of<Real>(largest);
+}
+
+template <typename Real>
+Real largest_magnitude(const Real* a, const Real* b, std::size_t n) {
+    using W = Wide<Real>;
+    typename W::Vector largest{};
+    for (std::size_t c = 0; c < W::vectors(n) * W::kLanes; c += W::kLanes) {
+        typename W::Vector v = W::at(a + c);
+        if (b != nullptr) v *= W::at(b + c);
+        largest = larger(largest, larger(v, -v));
+    }
+    return largest_of<Real>(largest);
 }
 
 }  // namespace
@@ -150,6 +242,34 @@ void subtract_square(float* m, std::size_t stride, std::size_t k, const float* u
 }
 void subtract_square(double* m, std::size_t stride, std::size_t k, const double* u) {
     square<double, false>(m, stride, k, u);
+}
+
+float room_ahead(const BoxedStep<float>& step, std::size_t n, float* out) {
+    return room(step, n, out);
+}
+double room_ahead(const BoxedStep<double>& step, std::size_t n, double* out) {
+    return room(step, n, out);
+}
+
+void move_inside(const BoxedStep<float>& step, float length, std::size_t n, float* out) {
+    move(step, length, n, out);
+}
+void move_inside(const BoxedStep<double>& step, double length, std::size_t n, double* out) {
+    move(step, length, n, out);
+}
+
+float projected_moves(const JacobiStep<float>& step, std::size_t n, float* out) {
+    return moves(step, n, out);
+}
+double projected_moves(const JacobiStep<double>& step, std::size_t n, double* out) {
+    return moves(step, n, out);
+}
+
+float largest_product(const float* a, const float* b, std::size_t n) {
+    return largest_magnitude(a, b, n);
+}
+double largest_product(const double* a, const double* b, std::size_t n) {
+    return largest_magnitude(a, b, n);
 }
 
 }  // namespace rig

@@ -21,7 +21,8 @@ inline constexpr std::size_t kLaneFloats = 16;  // rows are padded with zeros to
 }
 
 // out[c] = start[c] + sum_r coefficient[r] row_r[c], c in [0, n); row_r begins at rows + r stride.
-// n a multiple of kLaneFloats; `start` may be null (zero) or `out` itself; nothing else may overlap.
+// Rows hold zeros from n to padded(n) and `out` has room for padded(n), of which what lies behind n may or
+// may not be written; `start` may be null (zero) or `out` itself; nothing else may overlap.
 void combine_rows(const float* rows, std::size_t stride, const float* coefficient, std::size_t count,
                   std::size_t n, const float* start, float* out);
 void combine_rows(const double* rows, std::size_t stride, const double* coefficient, std::size_t count,
@@ -38,11 +39,48 @@ void combine_rows(const double* rows, std::size_t stride, const std::uint16_t* i
 [[nodiscard]] float padded_dot(const float* a, const float* b, std::size_t n);
 [[nodiscard]] double padded_dot(const double* a, const double* b, std::size_t n);
 
-// The symmetric k x k matrix m := m + u u^T (or m - u u^T), rows `stride` apart, over columns
-// [0, padded(k)); stays exactly symmetric.
+// The symmetric k x k matrix m := m + u u^T (or m - u u^T), rows `stride` apart, u zero from k to padded(k);
+// stays exactly symmetric.
 void add_square(float* m, std::size_t stride, std::size_t k, const float* u);
 void add_square(double* m, std::size_t stride, std::size_t k, const double* u);
 void subtract_square(float* m, std::size_t stride, std::size_t k, const float* u);
 void subtract_square(double* m, std::size_t stride, std::size_t k, const double* u);
+
+// The arrays of the following have room for padded(n), zeros behind n.
+
+template <typename Real>
+struct BoxedStep {
+    const Real* value;  // between low and high
+    const Real* step;   // taken away from value
+    const Real* low;
+    const Real* high;
+};
+
+// out := the share of the step after which a value meets its bound, at least 0, infinite where the whole step
+// stays inside; returns the least of them.
+[[nodiscard]] float room_ahead(const BoxedStep<float>& step, std::size_t n, float* out);
+[[nodiscard]] double room_ahead(const BoxedStep<double>& step, std::size_t n, double* out);
+
+// out := clamp(value - length step, low, high); low where the step is no number. `out` may be `value`.
+void move_inside(const BoxedStep<float>& step, float length, std::size_t n, float* out);
+void move_inside(const BoxedStep<double>& step, double length, std::size_t n, double* out);
+
+template <typename Real>
+struct JacobiStep {
+    const Real* x;
+    const Real* gradient;
+    const Real* scale;  // 1 / H_ii
+    const Real* low;
+    const Real* high;
+};
+
+// out := |x - clamp(x - scale gradient, low, high)|, no number where the step is none; returns the largest of
+// the others.
+[[nodiscard]] float projected_moves(const JacobiStep<float>& step, std::size_t n, float* out);
+[[nodiscard]] double projected_moves(const JacobiStep<double>& step, std::size_t n, double* out);
+
+// max |a[i] b[i]|, or max |a[i]| when b is null; zeros behind n. What is no number does not count.
+[[nodiscard]] float largest_product(const float* a, const float* b, std::size_t n);
+[[nodiscard]] double largest_product(const double* a, const double* b, std::size_t n);
 
 }  // namespace rig

@@ -52,14 +52,25 @@ struct BoxQpState {
 
     bool warm = false;  // false: the next solve starts from its weights alone
     bool inverse_valid = false;
+    bool settled = false;  // what is kept below belongs to `answer` in these bounds
     std::uint32_t hessian_version = 0;
-    std::uint16_t size = 0;        // N
-    std::uint16_t free_count = 0;  // k
+    std::uint16_t size = 0;          // N
+    std::uint16_t free_count = 0;    // k
+    std::uint16_t pinned_count = 0;  // variables that are not free and not zero
     std::array<Where, kMaxUnknowns> where{};
     std::array<std::uint16_t, kMaxUnknowns> free{};        // [k], in the order of the inverse's rows
+    std::array<std::uint16_t, kMaxUnknowns> pinned{};      // in no order
     alignas(64) std::array<Real, kMaxUnknowns> answer{};   // w of the last solve
     alignas(64) std::array<Real, kMaxUnknowns> product{};  // H answer
     alignas(64) std::array<Real, kMaxUnknowns> scale{};    // 1 / H_ii
+    alignas(64) std::array<Real, kMaxUnknowns> low{};
+    alignas(64) std::array<Real, kMaxUnknowns> high{};
+    alignas(64) std::array<Real, kMaxUnknowns> open{};  // 1 where the variable may be freed, else 0
+    // Of the free variables, in the order of the inverse's rows; zeros beyond.
+    alignas(64) std::array<Real, kMaxUnknowns> value{};
+    alignas(64) std::array<Real, kMaxUnknowns> free_low{};
+    alignas(64) std::array<Real, kMaxUnknowns> free_high{};
+    alignas(64) std::array<Real, kMaxUnknowns> free_scale{};
     alignas(64) std::array<Real, kMaxUnknowns * kInverseStride> inverse{};  // [k x k], zeros beyond
 };
 
@@ -68,13 +79,7 @@ struct BoxQpWorkspace {
     alignas(64) std::array<Real, kMaxUnknowns> gradient{};       // H w + q
     alignas(64) std::array<Real, kMaxUnknowns> free_gradient{};  // [k], as the inverse's rows
     alignas(64) std::array<Real, kMaxUnknowns> step{};           // [k] inverse free_gradient
-    // Of the free variables, in the order of the inverse's rows.
-    alignas(64) std::array<Real, kMaxUnknowns> value{};
-    alignas(64) std::array<Real, kMaxUnknowns> free_low{};
-    alignas(64) std::array<Real, kMaxUnknowns> free_high{};
-    // Of all: 1 where the variable may rise (fall) off the bound it sits at, else 0.
-    alignas(64) std::array<Real, kMaxUnknowns> may_rise{};
-    alignas(64) std::array<Real, kMaxUnknowns> may_fall{};
+    alignas(64) std::array<Real, kMaxUnknowns> moves{};          // of a projected Jacobi step
     alignas(64) std::array<Real, kMaxUnknowns> column{};
     alignas(64) std::array<Real, kMaxUnknowns> direction{};
     alignas(64) std::array<Real, kMaxUnknowns> moving{};
@@ -86,13 +91,23 @@ struct BoxQpReport {
     std::uint16_t iterations = 0;  // steps taken
     std::uint16_t changes = 0;     // of the working set
     std::uint16_t rebuilds = 0;    // of the inverse, from nothing
+    std::uint64_t work = 0;        // multiply-adds of passes over H and the inverse
     double kkt = 0.0;  // max_i |w_i - clamp(w_i - g_i / H_ii)|: the projected Jacobi step's largest move
     double objective = 0.0;  // 1/2 w^T H w + q^T w
     bool optimal = false;    // kkt within ten tolerances; false: stopped at the cap, or worn out
 };
 
+// A solve begins no further step once it has done this many multiply-adds,
+[[nodiscard]] constexpr std::uint64_t box_qp_work_budget(std::uint64_t n) {
+    return (n + 1) * (n + 1) * (2 * (n + 1) + 512);
+}
+// and never does more than this: the last step may free eight variables and make the inverse anew.
+[[nodiscard]] constexpr std::uint64_t box_qp_work_cap(std::uint64_t n) {
+    return box_qp_work_budget(n) + (n + 1) * (n + 1) * (n + 1 + 32);
+}
+
 // On entry `w` holds a start (any numbers; clamped), on return the answer, finite and inside the bounds for
-// finite H and q. Bounded work: iteration_cap steps and one rebuild.
+// finite H and q. Bounded: iteration_cap steps and box_qp_work_cap(N) multiply-adds.
 [[nodiscard]] BoxQpReport solve_box_qp(const BoxQpProblem<float>& problem, const BoxQpConfig& config,
                                        BoxQpState<float>& state, BoxQpWorkspace<float>& workspace,
                                        std::span<float> w);

@@ -22,8 +22,8 @@ bool follow(BoxQpState<Real>& s, std::span<const Real> z, bool add) {
     alignas(64) std::array<Real, kMaxUnknowns> u;
     for (std::size_t a = 0; a < k; ++a) part[a] = z[s.free[a]];
     for (std::size_t a = k; a < padded(k); ++a) part[a] = Real(0);
-    combine_rows(s.inverse.data(), BoxQpState<Real>::kInverseStride, part.data(), k, padded(k), nullptr,
-                 u.data());
+    for (std::size_t a = k; a < padded(k); ++a) u[a] = Real(0);
+    combine_rows(s.inverse.data(), BoxQpState<Real>::kInverseStride, part.data(), k, k, nullptr, u.data());
     const Real reach = padded_dot(part.data(), u.data(), padded(k));
     const Real denominator = add ? Real(1) + reach : Real(1) - reach;
     if (!(denominator > static_cast<Real>(kLeastDenominator))) {
@@ -37,6 +37,11 @@ bool follow(BoxQpState<Real>& s, std::span<const Real> z, bool add) {
     } else {
         add_square(s.inverse.data(), BoxQpState<Real>::kInverseStride, k, u.data());
     }
+    alignas(64) std::array<Real, kMaxUnknowns> term;
+    std::copy_n(z.begin(), s.size, term.begin());
+    std::fill_n(term.begin() + s.size, padded(s.size) - s.size, Real(0));
+    const Real along = padded_dot(term.data(), s.answer.data(), padded(s.size));
+    for (std::size_t i = 0; i < s.size; ++i) s.product[i] += term[i] * (add ? along : -along);
     return true;
 }
 
@@ -46,6 +51,7 @@ void settle(BoxQpState<Real>& s, std::span<const Real> hessian, std::size_t stri
     for (std::size_t i = 0; i < s.size; ++i) {
         s.scale[i] = Real(1) / std::max(hessian[i * stride + i], kLeastDiagonal<Real>);
     }
+    for (std::size_t a = 0; a < s.free_count; ++a) s.free_scale[a] = s.scale[s.free[a]];
     s.hessian_version = version;
 }
 

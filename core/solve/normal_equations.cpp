@@ -128,6 +128,8 @@ class HessianFollower {
             subtract_square(s_.hessian.data(), stride_, n_, e_.term.data());
         }
         ++s_.followed;
+        const std::uint64_t free = qp_.free_count;
+        e_.work += 3 * n_ + n_ * n_ + (follow_inverse ? 2 * free * free + 2 * n_ : 0);
         return !follow_inverse || follow_hessian(qp_, {e_.term.data(), n_}, add);
     }
 
@@ -167,6 +169,7 @@ void build_linear(const SolvePack& pack, const NormalTables<Real>& tables, const
         e.constant_mm2 += gamma * previous * previous;
     }
     for (std::size_t i = n; i < padded(n); ++i) e.linear[i] = Real(0);
+    e.work += rows * n;
     combine_rows(tables.basis_mm.data(), stride, e.rows.data(), e.error.data(), rows, padded(n),
                  e.linear.data(), e.linear.data());
 }
@@ -202,6 +205,7 @@ void build_normal_equations(const SolvePack& pack, const NormalTables<Real>& tab
     RIG_CHECK(input.positions_mm.size() == pack.marker_count && input.weights.size() == pack.marker_count);
     HessianFollower<Real> follower(pack, tables, state, qp, e);
     const bool fresh = !state.valid;
+    e.work = 0;
     e.changed = follower.follow(input);
     if (fresh || input.gamma_scale != state.gamma_scale) follower.regularise(pack, input.gamma_scale);
     build_linear(pack, tables, input, state, e);

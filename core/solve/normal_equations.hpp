@@ -62,8 +62,14 @@ struct NormalEquations {
     std::array<std::uint16_t, kMaxRows> rows{};              // scratch: which rows
     double constant_mm2 = 0.0;                               // E(0)
     std::size_t markers_used = 0;
-    bool changed = false;  // H or V is not the last frame's
+    bool changed = false;    // H or V is not the last frame's
+    std::uint64_t work = 0;  // multiply-adds of this frame, those of the inverse that follows among them
 };
+
+// The most that `work` can be for m markers and n shapes: every marker changes in six rank-one terms.
+[[nodiscard]] constexpr std::uint64_t normal_work_cap(std::uint64_t m, std::uint64_t n) {
+    return 6 * m * (3 * n * n + 5 * n) + 3 * m * n;
+}
 
 // V that differs by less than this share of its trace counts as the same: a ray turns by less while a marker
 // moves about its place.

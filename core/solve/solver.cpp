@@ -74,6 +74,7 @@ void add_certificate(const BoxQpReport& qp, double constant_mm2, SolverReport& r
     report.kkt = qp.kkt;
     report.iterations = static_cast<std::uint16_t>(report.iterations + qp.iterations);
     report.changes = static_cast<std::uint16_t>(report.changes + qp.changes);
+    report.work += qp.work;
     report.objective_mm2 = 2.0 * qp.objective + constant_mm2;
 }
 
@@ -198,6 +199,7 @@ void solve_in(const SolverConfig& config, const NormalTables<Real>& tables, cons
     const std::size_t n = pack.shape_count;
     build_normal_equations(pack, tables, input, quadratic.normal, quadratic.qp, own.equations);
     report.markers_used = static_cast<std::uint16_t>(own.equations.markers_used);
+    report.work = own.equations.work;
     update_confidence(config, quadratic.normal, state, w);
     output.confidence = state.confidence;
     if (!enough) {

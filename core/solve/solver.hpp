@@ -98,6 +98,9 @@ struct SolverReport {
     std::uint16_t iterations = 0;
     std::uint16_t changes = 0;  // of the working set
     std::uint16_t markers_used = 0;
+    // Multiply-adds of H and of the QP: at most normal_work_cap(m, N) + box_qp_work_cap(N), or twice the
+    // latter when shapes cancel each other, three times when an RBF also falls back.
+    std::uint64_t work = 0;
     double residual_rms_mm = 0.0;
     double hull_distance = 0.0;  // RBF: distance to the nearest centre, in that centre's widths
     // RBF: share of the box QP in the answer, 0 unless the pack has a fallback. Where it is not 0, the

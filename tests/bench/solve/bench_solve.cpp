@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "core/solve/box_qp.hpp"
+#include "core/solve/normal_equations.hpp"
 #include "tests/support/solver_problems.hpp"
 #include "tests/support/textbook_solvers.hpp"
 
@@ -77,18 +78,20 @@ double now_us() {
     return static_cast<double>(t.tv_sec) * 1e6 + static_cast<double>(t.tv_nsec) * 1e-3;
 }
 
-double clock_cost_us() {
-    double least = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < 20'000; ++i) {
-        const double a = now_us();
-        least = std::min(least, now_us() - a);
-    }
-    return least;
-}
-
 double quantile(std::vector<double> values, double share) {
     std::sort(values.begin(), values.end());
     return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+// A low quantile, not the least: one pair of readings that came out equal would take the cost for nothing and
+// flatter every ratio.
+double clock_cost_us() {
+    std::vector<double> costs;
+    for (int i = 0; i < 20'000; ++i) {
+        const double a = now_us();
+        costs.push_back(now_us() - a);
+    }
+    return quantile(std::move(costs), 0.1);
 }
 
 // What a method left behind in one frame, judged in double against the frame's own problem.
@@ -262,9 +265,9 @@ class OwnSolver {
             combine_rows(basis_.data(), stride_, target_.data(), bench_.family.rows, padded(n_),
                          start_.data(), linear_.data());
             for (std::size_t a = 0; a < k; ++a) free_[a] = linear_[state_->free[a]];
-            combine_rows(state_->inverse.data(), BoxQpState<Real>::kInverseStride, free_.data(), k, padded(k),
+            combine_rows(state_->inverse.data(), BoxQpState<Real>::kInverseStride, free_.data(), k, k,
                          nullptr, step_.data());
-            combine_rows(hessian_.data(), stride_, index_.data(), coefficient_.data(), moving, padded(n_),
+            combine_rows(hessian_.data(), stride_, index_.data(), coefficient_.data(), moving, n_,
                          linear_.data(), gradient_.data());
         });
         return timed_us;
@@ -435,6 +438,39 @@ void run_rivals(const Bench& bench, const Truth& truth, double floor) {
     }
 }
 
+// The time of one multiply-add, in pairs of an application of the inverse and a rank-one update of it at the
+// most shapes there can be.
+template <typename Real>
+double multiply_add_us() {
+    constexpr std::size_t kSize = kMaxShapes;
+    constexpr std::size_t kStride = row_stride(kSize);
+    constexpr int kPairs = 50;
+    std::vector<Real> m(kSize * kStride, Real(0)), u(kStride, Real(1e-3)), out(kStride, Real(0));
+    double least = std::numeric_limits<double>::infinity();
+    for (int replay = 0; replay < 20; ++replay) {
+        timed([&] {
+            for (int pair = 0; pair < kPairs; ++pair) {
+                combine_rows(m.data(), kStride, u.data(), kSize, kSize, nullptr, out.data());
+                add_square(m.data(), kStride, kSize, u.data());
+            }
+        });
+        least = std::min(least, timed_us);
+    }
+    return least / (2.0 * kPairs * static_cast<double>(kSize * kSize));
+}
+
+void print_cap() {
+    const auto qp = static_cast<double>(box_qp_work_cap(kMaxShapes));
+    const auto normal = static_cast<double>(normal_work_cap(kMaxMarkers, kMaxShapes));
+    const double single = multiply_add_us<float>(), precise = multiply_add_us<double>();
+    fmt::print(
+        "\nthe caps at {} shapes: {:.1f} million multiply-adds of the QP, {:.0f} us in float, {:.0f} us in "
+        "double; "
+        "{:.1f} million of H with {} markers, {:.0f} and {:.0f} us\n",
+        kMaxShapes, 1e-6 * qp, qp * single, qp * precise, 1e-6 * normal, kMaxMarkers, normal * single,
+        normal * precise);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -480,5 +516,6 @@ int main(int argc, char** argv) {
         fmt::print("\ngrowth of b warm from 46 to 280 shapes (306 rows): exponent {:.2f}\n",
                    std::log(largest / smallest) / std::log(280.0 / 46.0));
     }
+    print_cap();
     return sound ? 0 : 1;
 }

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "tests/support/random.hpp"
@@ -119,6 +121,74 @@ TYPED_TEST(FloatKernels, SquaresKeepAMatrixSymmetricToTheBit) {
                 ASSERT_EQ(m[r * stride + c], Real(0)) << "the padding";
         }
     }
+}
+
+// What lies behind n is skipped as far as the vectors allow, and nothing before it changes.
+TYPED_TEST(FloatKernels, NarrowRowsGiveTheSameNumbers) {
+    using Real = TypeParam;
+    test::SeededRandom random(15);
+    for (std::size_t n = 1; n < 70; ++n) {
+        const std::size_t stride = row_stride(n);
+        std::vector<Real> rows(n * stride, Real(0)), u(padded(n), Real(0)), out(padded(n), Real(0));
+        for (std::size_t r = 0; r < n; ++r) {
+            u[r] = static_cast<Real>(random.normal(0.0, 1.0));
+            for (std::size_t c = 0; c < n; ++c)
+                rows[r * stride + c] = static_cast<Real>(random.normal(0.0, 1.0));
+        }
+        std::vector<Real> whole(padded(n));
+        combine_rows(rows.data(), stride, u.data(), n, padded(n), nullptr, whole.data());
+        combine_rows(rows.data(), stride, u.data(), n, n, nullptr, out.data());
+        EXPECT_EQ(out, whole);
+    }
+}
+
+TYPED_TEST(FloatKernels, StepsEndAtTheFirstBound) {
+    using Real = TypeParam;
+    const Real infinity = std::numeric_limits<Real>::infinity();
+    std::vector<Real> value(16), step(16), low(16), high(16), room(16), out(16);
+    const auto set = [&](std::size_t i, double v, double s, Real l, Real h) {
+        value[i] = static_cast<Real>(v);
+        step[i] = static_cast<Real>(s);
+        low[i] = l;
+        high[i] = h;
+    };
+    set(0, 0.5, 0.25, Real(0), Real(1));   // stays inside
+    set(1, 0.5, 1.0, Real(0), Real(1));    // falls: half way
+    set(2, 0.25, -3.0, Real(0), Real(1));  // rises: a quarter
+    EXPECT_EQ(room_ahead({value.data(), step.data(), low.data(), high.data()}, 3, room.data()), Real(0.25));
+    EXPECT_EQ(room[0], infinity);
+    EXPECT_EQ(room[1], Real(0.5));
+    set(3, 0.0, 2.0, Real(0), Real(1));       // at its bound already
+    set(4, 5.0, 100.0, -infinity, infinity);  // nothing in its way
+    EXPECT_EQ(room_ahead({value.data(), step.data(), low.data(), high.data()}, 5, room.data()), Real(0));
+    EXPECT_EQ(room[4], infinity);
+    move_inside({value.data(), step.data(), low.data(), high.data()}, Real(0.5), 5, out.data());
+    EXPECT_EQ(std::vector<Real>(out.begin(), out.begin() + 5),
+              (std::vector<Real>{Real(0.375), Real(0), Real(1), Real(0), Real(-45)}));
+}
+
+TYPED_TEST(FloatKernels, ProjectedMovesStopAtTheBounds) {
+    using Real = TypeParam;
+    const Real nan = std::numeric_limits<Real>::quiet_NaN();
+    std::vector<Real> x(16), g(16), scale(16), low(16), high(16), out(16);
+    std::fill(high.begin(), high.end(), Real(1));
+    std::fill(scale.begin(), scale.end(), Real(0.5));
+    x[0] = Real(0.5), g[0] = Real(0.5);  // moves by a quarter
+    x[1] = Real(0), g[1] = Real(4);      // held by its bound
+    x[2] = Real(0.25), g[2] = Real(-8);  // as far as the bound
+    g[3] = nan;
+    EXPECT_EQ(projected_moves({x.data(), g.data(), scale.data(), low.data(), high.data()}, 4, out.data()),
+              Real(0.75));
+    EXPECT_EQ(out[0], Real(0.25));
+    EXPECT_EQ(out[1], Real(0));
+    EXPECT_EQ(out[2], Real(0.75));
+    EXPECT_TRUE(std::isnan(out[3]));
+    const std::vector<Real> a{Real(1), Real(-3), nan, Real(2)}, b{Real(1), Real(2), Real(1), Real(-2)};
+    std::vector<Real> wide_a(16), wide_b(16);
+    std::copy(a.begin(), a.end(), wide_a.begin());
+    std::copy(b.begin(), b.end(), wide_b.begin());
+    EXPECT_EQ(largest_product(wide_a.data(), wide_b.data(), 4), Real(6));
+    EXPECT_EQ(largest_product(wide_a.data(), nullptr, 4), Real(3));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -332,6 +333,26 @@ TYPED_TEST(BoxQp, StepOfNoLengthStopsEverybody) {
     EXPECT_EQ(found.w[0], 0.0);
     EXPECT_NEAR(found.w[1], 2.0, 1e-6);
     EXPECT_NEAR(found.w[2], 0.5, 1e-6);
+}
+
+// A solve that has nothing to do applies the inverse once and makes the gradient once.
+TYPED_TEST(BoxQp, WorkCountsTheMultiplyAdds) {
+    test::SeededRandom random(108);
+    for (const std::size_t n : {1U, 7U, 40U}) {
+        const Problem p = random_problem(n, 2 * n, 0.5, random);
+        BoxQpState<TypeParam> state;
+        const auto first = this->solve_from(p, state, std::vector<double>(n, 0.5));
+        ASSERT_TRUE(first.report.optimal);
+        EXPECT_GT(first.report.work, 0U);
+        EXPECT_LE(first.report.work, box_qp_work_cap(n));
+        state.hessian_version += 1;  // as solve_from() names the next problem, whose H is the same
+        const auto again = this->solve_from(p, state, first.w);
+        const auto used = static_cast<std::size_t>(
+            std::count_if(again.w.begin(), again.w.end(), [](double x) { return x != 0.0; }));
+        ASSERT_EQ(again.report.iterations, 1);
+        EXPECT_EQ(again.report.work,
+                  static_cast<std::uint64_t>(state.free_count) * state.free_count + used * n);
+    }
 }
 
 TYPED_TEST(BoxQp, EmptyProblem) {
