@@ -1,0 +1,567 @@
+#include "core/solve/simplex_qp.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "core/base/check.hpp"
+#include "core/solve/lanes.hpp"
+
+namespace rig {
+
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+// An example whose part outside the affine span of those in use is under this share of its square counts as
+// dependent on them: what float's rounding leaves of it says nothing.
+constexpr float kDependent = 4e-6F;
+constexpr float kLeastShift_mm2 = 1e-8F;    // examples within 0.1 um of each other are equal
+constexpr float kAccepted = 4.0F;           // tolerances: rounding leaves this much on ill-conditioned faces
+constexpr float kLostSum = 0.25F;           // coefficients whose sum is off by this came from no inverse
+constexpr int kRefinements = 3;             // each gains the inverse's own accuracy once more
+constexpr float kEnterShare = 0.25F;        // of the hardest pull
+constexpr float kSameValue = 1e-6F;         // objectives closer than this differ by rounding
+constexpr int kChangesBeforeRebuild = 256;  // each leaves its rounding in the inverse
+constexpr int kPatience = 3;                // exchanges that may pass without a better objective
+
+using Set = std::uint32_t;  // one bit an example
+static_assert(kMaxRegionShapes <= 32);
+
+bool finite(float x) {
+    return std::fabs(x) <= std::numeric_limits<float>::max();
+}
+
+constexpr Set bit(std::size_t i) {
+    return Set{1} << i;
+}
+
+// Takes the first member out of the set.
+std::size_t take_first(Set& set) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(set));
+    set &= set - 1;
+    return i;
+}
+
+template <std::size_t kWidth>
+class FaceWalk {
+  public:
+    FaceWalk(const SimplexQpProblem& problem, const SimplexQpConfig& config, SimplexQpState& state,
+             SimplexQpWorkspace& ws, SimplexQpReport& report)
+        : p_(problem), config_(config), s_(state), ws_(ws), report_(report), n_(problem.count) {}
+
+    void run();
+
+  private:
+    using Row = Lanes<kWidth>;
+
+    [[nodiscard]] const float* gram() const { return s_.all_rows ? p_.gram.data() : s_.gram.data(); }
+    [[nodiscard]] const float* gram_row(std::size_t i) const { return gram() + i * kWidth; }
+    [[nodiscard]] float* inverse_row(std::size_t i) { return s_.inverse.data() + i * kWidth; }
+
+    bool adopt_rows();
+    void weigh_rows(bool whole, bool& changed);
+    void adopt_gram();
+    void start_cold();
+    bool exchange();
+    bool sharpen_fully();
+    [[nodiscard]] float objective_at_aim() const;
+    bool bring_in(Set entering);
+    bool restore();
+    bool step();
+    bool aim_directly();
+    bool sharpen();
+    bool bring_to_sum(Row aim);
+    void measure(const float* at);
+    [[nodiscard]] Set wanted() const;
+    bool walk();
+    bool enter();
+    void keep_sum();
+    float project(std::size_t i);
+    bool add(std::size_t i);
+    void remove(std::size_t i);
+    void add_outer_to_inverse(float factor, const float* u);
+    bool slide(std::size_t i);
+    bool rebuild();
+    bool rebuild_once();
+    void mark(std::size_t i, bool in_use);
+    void certify();
+
+    const SimplexQpProblem& p_;
+    const SimplexQpConfig& config_;
+    SimplexQpState& s_;
+    SimplexQpWorkspace& ws_;
+    SimplexQpReport& report_;
+    std::size_t n_;
+    float enough_ = 0.0F;    // tolerance at the size of this frame's numbers
+    float lambda_ = 0.0F;    // the pull that all examples in use share
+    float residual_ = 0.0F;  // largest Jacobi move among them
+    float aim_sum_ = 1.0F;
+    Set negative_ = 0;  // of the aim
+    Set skipped_ = 0;   // dependent on those in use, with nothing to gain
+    bool rebuilt_ = false;
+    bool measured_ = false;         // pull and lambda belong to the coefficients
+    std::size_t entered_ = kWidth;  // last
+    std::size_t standstills_ = 0;
+};
+
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::run() {
+    if (!adopt_rows()) return;
+    if (!s_.warm) start_cold();
+    if (s_.changes_since_rebuild > kChangesBeforeRebuild && !rebuild()) start_cold();
+    if (!exchange()) {
+        while (report_.iterations < config_.iteration_cap) {
+            ++report_.iterations;
+            if (!step()) break;
+        }
+    }
+    certify();
+}
+
+// Which rows count, and G^T V g. The usual frame has every row and is read in place. False: no row is seen,
+// and the last answer stays, or the mean of the examples where there is none.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::adopt_rows() {
+    int strays = p_.row_weight.empty() ? 0 : 1;
+    for (std::size_t r = 0; r < p_.rows; ++r) {
+        strays += std::fabs(p_.target[r]) <= kMaxSimplexTarget ? 0 : 1;  // the int keeps this loop in vectors
+    }
+    const bool whole = strays == 0;
+    const bool same = s_.warm && s_.version == p_.version && s_.count == n_ && s_.rows == p_.rows;
+    if (!same) s_.warm = false;
+    bool changed = !same || whole != s_.all_rows;
+    weigh_rows(whole, changed);
+    s_.all_rows = whole;
+    if (report_.rows_used == 0) {
+        report_.optimal = true;
+        if (!s_.warm) {
+            s_.coefficients.fill(0.0F);
+            std::fill_n(s_.coefficients.begin(), n_, 1.0F / static_cast<float>(n_));
+        }
+        return false;
+    }
+    const float* target = whole ? p_.target.data() : ws_.weighted.data();
+    combine_rows(p_.examples.data(), kWidth, target, p_.rows, kWidth, nullptr, ws_.linear.data());
+    if (changed) adopt_gram();
+    const float size = Row(ws_.linear.data()).magnitude().largest();
+    enough_ = config_.tolerance * std::max(1.0F, size / s_.shift);
+    return true;
+}
+
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::weigh_rows(bool whole, bool& changed) {
+    report_.rows_used = static_cast<std::uint16_t>(p_.rows);
+    if (whole) return;
+    report_.rows_used = 0;
+    for (std::size_t r = 0; r < p_.rows; ++r) {
+        const bool seen = std::fabs(p_.target[r]) <= kMaxSimplexTarget;
+        const float weight = !seen ? 0.0F : p_.row_weight.empty() ? 1.0F : p_.row_weight[r];
+        changed |= weight != s_.row_weight[r];
+        s_.row_weight[r] = weight;
+        ws_.weighted[r] = weight > 0.0F ? weight * p_.target[r] : 0.0F;
+        report_.rows_used = static_cast<std::uint16_t>(report_.rows_used + (weight > 0.0F ? 1 : 0));
+    }
+}
+
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::adopt_gram() {
+    if (!s_.all_rows) {
+        build_simplex_gram(p_.examples, p_.rows, n_, {s_.row_weight.data(), p_.rows}, s_.gram);
+    }
+    float trace = 0.0F;
+    for (std::size_t i = 0; i < n_; ++i) trace += gram_row(i)[i];
+    // Any shift is right; this one has the size of the other eigenvalues.
+    s_.shift = finite(trace) ? std::max(trace / static_cast<float>(n_), kLeastShift_mm2) : 1.0F;
+    s_.inverse_diagonal.fill(0.0F);
+    for (std::size_t i = 0; i < n_; ++i) s_.inverse_diagonal[i] = 1.0F / (gram_row(i)[i] + s_.shift);
+    s_.version = p_.version;
+    s_.count = static_cast<std::uint16_t>(n_);
+    s_.rows = static_cast<std::uint16_t>(p_.rows);
+    if (s_.warm && !rebuild()) start_cold();
+}
+
+// At the nearest single example.
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::start_cold() {
+    std::size_t best = 0;
+    float least = kInfinity;
+    for (std::size_t i = 0; i < n_; ++i) {
+        const float value = 0.5F * gram_row(i)[i] - ws_.linear[i];
+        if (value < least) {
+            least = value;
+            best = i;
+        }
+    }
+    s_.coefficients.fill(0.0F);
+    s_.coefficients[best] = 1.0F;
+    s_.warm = true;
+    s_.used = s_.settled = bit(best);
+    measured_ = false;
+    static_cast<void>(rebuild());  // one example is never dependent
+}
+
+// Yesterday's set, changed by several examples at once: all whose coefficient on its affine span is negative
+// leave together; where none is, all that pull hardest come in. It goes on as long as every such feasible
+// point is better than the one before, which cannot go round in circles; then, and where examples depend on
+// each other, the walk that changes one at a time takes over. The coefficients are the best feasible point so
+// far. True: optimal.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::exchange() {
+    float best = kInfinity;
+    int patience = kPatience;
+    while (report_.iterations < config_.iteration_cap && aim_directly()) {
+        ++report_.iterations;
+        if (negative_ != 0) {
+            for (Set leaving = negative_; leaving != 0;) remove(take_first(leaving));
+            continue;
+        }
+        if (!sharpen_fully()) return restore();
+        const float objective = objective_at_aim();
+        if (!(objective <= best + kSameValue * std::fabs(objective))) return restore();
+        if (!(objective < best) && --patience == 0) return false;
+        best = std::min(best, objective);
+        ((1.0F / aim_sum_) * Row(ws_.aim.data())).store(s_.coefficients.data());
+        s_.settled = s_.used;
+        measured_ = true;
+        const Set entering = wanted();
+        if (entering == 0) return residual_ <= kAccepted * enough_;
+        if (!bring_in(entering)) return restore();
+    }
+    return restore();
+}
+
+// Back to the best feasible point, with the examples that were in use there. Always false.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::restore() {
+    for (Set leaving = s_.used & ~s_.settled; leaving != 0;) remove(take_first(leaving));
+    for (Set entering = s_.settled & ~s_.used; entering != 0;) {
+        if (add(take_first(entering))) continue;
+        s_.used = s_.settled;
+        if (!rebuild()) start_cold();
+        break;
+    }
+    return false;
+}
+
+// Measures the aim and sharpens it until the inverse's error is gone. False when that made a coefficient
+// negative.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::sharpen_fully() {
+    measure(ws_.aim.data());
+    for (int i = 0; i < kRefinements && residual_ > enough_; ++i) {
+        const float before = residual_;
+        if (!sharpen() || negative_ != 0) return false;
+        measure(ws_.aim.data());
+        if (!(residual_ < 0.5F * before)) break;
+    }
+    return true;
+}
+
+template <std::size_t kWidth>
+float FaceWalk<kWidth>::objective_at_aim() const {
+    return -0.5F * (Row(ws_.aim.data()) * (Row(ws_.pull.data()) + Row(ws_.linear.data()))).sum();
+}
+
+// From the coefficients at hand to the minimum of their face, and on to the next. False: nothing is left to
+// do.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::step() {
+    if (!aim_directly()) return rebuild_once();
+    if (!walk()) return true;
+    measure(s_.coefficients.data());
+    for (int i = 0; i < kRefinements && residual_ > enough_; ++i) {
+        const float before = residual_;
+        ws_.aim = s_.coefficients;
+        if (!sharpen()) return rebuild_once();
+        if (!walk()) return true;
+        measure(s_.coefficients.data());
+        if (!(residual_ < 0.5F * before)) break;
+    }
+    measured_ = true;
+    if (residual_ > kAccepted * enough_ && rebuild_once()) return true;
+    return enter();
+}
+
+// aim := the minimum on the affine span of the examples in use: inverse (linear - lambda 1), lambda such that
+// it sums to 1. False: the inverse is worn out.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::aim_directly() {
+    Row aim(0.0F);
+    aim.add_rows(s_.inverse.data(), ws_.linear.data(), n_);
+    return bring_to_sum(aim);
+}
+
+// The same from the pull at the aim, which takes away most of the inverse's own error.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::sharpen() {
+    Row aim(ws_.aim.data());
+    aim.add_rows(s_.inverse.data(), ws_.pull.data(), n_);
+    return bring_to_sum(aim);
+}
+
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::bring_to_sum(Row aim) {
+    const Row sums(s_.inverse_sums.data());
+    const float along = (1.0F - aim.sum()) / sums.sum();
+    aim += along * sums;
+    aim.store(ws_.aim.data());
+    aim_sum_ = aim.sum();
+    negative_ = (Row(0.0F) - aim).above(0.0F);
+    return std::fabs(aim_sum_ - 1.0F) < kLostSum;  // refuses NaN as well
+}
+
+// pull and what follows from it at a point on the affine span of the examples in use.
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::measure(const float* at) {
+    const Row point(at);
+    Row fitted(0.0F);
+    fitted.add_rows(gram(), at, n_);
+    const Row pull = Row(ws_.linear.data()) - fitted;
+    lambda_ = (point * pull).sum();
+    const Row move = (pull - Row(lambda_)) * Row(s_.inverse_diagonal.data());
+    residual_ = (move.magnitude() * Row(s_.used_lane.data())).largest();
+    pull.store(ws_.pull.data());
+    move.store(ws_.move.data());
+}
+
+// Not in use, and would come in by more than the tolerance. The inverse diagonal of padding lanes is zero.
+template <std::size_t kWidth>
+Set FaceWalk<kWidth>::wanted() const {
+    return Row(ws_.move.data()).above(enough_) & ~s_.used & ~skipped_;
+}
+
+// Those that pull nearly as hard as the hardest; the others may not want to any more once these are in. False
+// when one depends on those in use.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::bring_in(Set entering) {
+    float largest = 0.0F;
+    for (Set set = entering; set != 0;) largest = std::max(largest, ws_.move[take_first(set)]);
+    entering &= Row(ws_.move.data()).above(kEnterShare * largest);
+    while (entering != 0) {
+        if (!add(take_first(entering))) return false;
+    }
+    return true;
+}
+
+// Towards the aim as far as the coefficients stay non-negative. True when it was reached; else the example
+// whose coefficient became zero is out of use.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::walk() {
+    measured_ = false;
+    Set shrinking = negative_;
+    if (shrinking == 0) {
+        ((1.0F / aim_sum_) * Row(ws_.aim.data())).store(s_.coefficients.data());
+        standstills_ = 0;
+        return true;
+    }
+    float length = kInfinity;
+    std::size_t blocking = 0;
+    while (shrinking != 0) {
+        const std::size_t i = take_first(shrinking);
+        const float room = s_.coefficients[i] / (s_.coefficients[i] - ws_.aim[i]);
+        if (!(room < length)) continue;
+        length = room;
+        blocking = i;
+    }
+    const Row c(s_.coefficients.data());
+    (c + length * (Row(ws_.aim.data()) - c)).above_zero().store(s_.coefficients.data());
+    s_.coefficients[blocking] = 0.0F;
+    keep_sum();
+    standstills_ = length > 0.0F ? 0 : standstills_ + 1;
+    remove(blocking);
+    // It came in for nothing but rounding: the inverse's, or the pull's.
+    if (blocking == entered_ && length == 0.0F && !rebuild_once()) skipped_ |= bit(blocking);
+    return false;
+}
+
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::keep_sum() {
+    const Row c(s_.coefficients.data());
+    ((1.0F / c.sum()) * c).store(s_.coefficients.data());
+}
+
+// The unused example that pulls hardest comes in; after as many standstills as there are examples the first
+// that pulls at all (Bland's rule), which cannot go round in circles.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::enter() {
+    for (Set set = wanted(); set != 0; set = wanted()) {
+        std::size_t best = take_first(set);
+        while (set != 0 && standstills_ <= n_) {
+            const std::size_t i = take_first(set);
+            if (ws_.move[i] > ws_.move[best]) best = i;
+        }
+        entered_ = best;
+        if (add(best) || slide(best)) return true;
+        skipped_ |= bit(best);
+    }
+    return false;
+}
+
+// projection := inverse (Gram_i + shift 1); returns what the diagonal keeps beyond it.
+template <std::size_t kWidth>
+float FaceWalk<kWidth>::project(std::size_t i) {
+    const Row column = Row(gram_row(i)) + Row(s_.shift);
+    column.store(ws_.column.data());
+    Row projection(0.0F);
+    projection.add_rows(s_.inverse.data(), ws_.column.data(), n_);
+    projection.store(ws_.projection.data());
+    return ws_.column[i] - (column * projection).sum();
+}
+
+// Bordering: inverse += u u^T / rest, u = projection - e_i. False when the example depends on those in use.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::add(std::size_t i) {
+    const float rest = project(i);
+    if (!(rest * s_.inverse_diagonal[i] > kDependent)) return false;
+    ws_.projection[i] = -1.0F;
+    const float scale = 1.0F / rest;
+    add_outer_to_inverse(scale, ws_.projection.data());
+    const Row u(ws_.projection.data());
+    (Row(s_.inverse_sums.data()) + (scale * u.sum()) * u).store(s_.inverse_sums.data());
+    mark(i, true);
+    ++report_.changes;
+    ++s_.changes_since_rebuild;
+    return true;
+}
+
+// Deflation: inverse -= m m^T / m_i, m its column i, which leaves row and column i zero.
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::remove(std::size_t i) {
+    const Row m(inverse_row(i));
+    m.store(ws_.column.data());
+    const float scale = -1.0F / ws_.column[i];
+    (Row(s_.inverse_sums.data()) + (scale * s_.inverse_sums[i]) * m).store(s_.inverse_sums.data());
+    add_outer_to_inverse(scale, ws_.column.data());
+    for (std::size_t k = 0; k < n_; ++k) inverse_row(k)[i] = 0.0F;
+    Row(0.0F).store(inverse_row(i));
+    s_.inverse_sums[i] = 0.0F;
+    mark(i, false);
+    ++report_.changes;
+    ++s_.changes_since_rebuild;
+}
+
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::add_outer_to_inverse(float factor, const float* u) {
+    const Row scaled = factor * Row(u);
+    for (std::size_t r = 0; r < n_; ++r) {
+        float* row = inverse_row(r);
+        (Row(row) + u[r] * scaled).store(row);
+    }
+}
+
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::mark(std::size_t i, bool in_use) {
+    s_.used = in_use ? s_.used | bit(i) : s_.used & ~bit(i);
+    s_.used_lane[i] = in_use ? 1.0F : 0.0F;
+}
+
+// Example i is an affine combination (projection) of those in use, so its coefficient can grow at their cost
+// without a curvature to stop it: until the first of theirs is zero and leaves, and so on until what is left
+// in use does not hold example i any more and it comes in. False: the numbers do not allow it.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::slide(std::size_t i) {
+    measured_ = false;
+    for (std::size_t pass = 0; pass < n_; ++pass) {
+        float length = kInfinity;
+        std::size_t blocking = kWidth;
+        for (Set set = s_.used; set != 0;) {
+            const std::size_t k = take_first(set);
+            if (!(ws_.projection[k] > kDependent)) continue;
+            const float room = s_.coefficients[k] / ws_.projection[k];
+            if (!(room < length)) continue;
+            length = room;
+            blocking = k;
+        }
+        if (blocking == kWidth) return false;
+        const float reached = s_.coefficients[i] + length;
+        const Row taken = length * (Row(ws_.projection.data()) * Row(s_.used_lane.data()));
+        (Row(s_.coefficients.data()) - taken).above_zero().store(s_.coefficients.data());
+        s_.coefficients[i] = reached;
+        s_.coefficients[blocking] = 0.0F;
+        keep_sum();
+        standstills_ = length > 0.0F ? 0 : standstills_ + 1;
+        remove(blocking);
+        if (add(i)) return true;
+    }
+    start_cold();
+    return false;
+}
+
+// The inverse from nothing, over the examples in use. False when they depend on each other.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::rebuild() {
+    ++report_.rebuilds;
+    s_.changes_since_rebuild = 0;
+    std::fill_n(s_.inverse.begin(), n_ * kWidth, 0.0F);
+    s_.inverse_sums.fill(0.0F);
+    s_.used_lane.fill(0.0F);
+    Set wanted = s_.used;
+    s_.used = 0;
+    while (wanted != 0) {
+        if (!add(take_first(wanted))) return false;
+    }
+    return true;
+}
+
+// A worn inverse is made anew once a frame. False: that was done already.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::rebuild_once() {
+    if (rebuilt_) return false;
+    rebuilt_ = true;
+    if (!rebuild()) start_cold();
+    return true;
+}
+
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::certify() {
+    if (!measured_) measure(s_.coefficients.data());
+    const Row c(s_.coefficients.data());
+    const Row pull(ws_.pull.data());
+    const Row target = (c + Row(ws_.move.data())).above_zero();
+    report_.kkt = (c - target).magnitude().largest();
+    float highest = lambda_;
+    for (std::size_t i = 0; i < n_; ++i) highest = std::max(highest, ws_.pull[i]);
+    report_.gap = highest - lambda_;
+    report_.objective = -0.5F * (c * (pull + Row(ws_.linear.data()))).sum();
+    report_.optimal = report_.kkt <= kAccepted * enough_;
+}
+
+template <std::size_t kWidth>
+SimplexQpReport solve(const SimplexQpProblem& problem, const SimplexQpConfig& config, SimplexQpState& state,
+                      SimplexQpWorkspace& workspace) {
+    SimplexQpReport report;
+    FaceWalk<kWidth>(problem, config, state, workspace, report).run();
+    return report;
+}
+
+}  // namespace
+
+void build_simplex_gram(std::span<const float> examples, std::size_t rows, std::size_t count,
+                        std::span<const float> row_weight, std::span<float> gram) {
+    const std::size_t stride = padded(count);
+    RIG_CHECK(count > 0 && count <= kMaxRegionShapes && examples.size() >= rows * stride);
+    RIG_CHECK(gram.size() >= count * stride && (row_weight.empty() || row_weight.size() >= rows));
+    std::fill_n(gram.begin(), count * stride, 0.0F);
+    for (std::size_t r = 0; r < rows; ++r) {
+        const float weight = row_weight.empty() ? 1.0F : row_weight[r];
+        if (weight > 0.0F) add_outer(gram.data(), stride, count, weight, examples.data() + r * stride);
+    }
+}
+
+SimplexQpReport solve_simplex_qp(const SimplexQpProblem& problem, const SimplexQpConfig& config,
+                                 SimplexQpState& state, SimplexQpWorkspace& workspace, std::span<float> c) {
+    RIG_CHECK(problem.count > 0 && problem.count <= kMaxRegionShapes);
+    RIG_CHECK(problem.rows > 0 && problem.rows <= kMaxRows && problem.stride == padded(problem.count));
+    RIG_CHECK(problem.examples.size() >= problem.rows * problem.stride);
+    RIG_CHECK(problem.gram.size() >= problem.count * problem.stride);
+    RIG_CHECK(problem.target.size() >= problem.rows && c.size() >= problem.count);
+    RIG_CHECK(problem.row_weight.empty() || problem.row_weight.size() >= problem.rows);
+    const SimplexQpReport report = problem.stride == kLaneFloats
+                                       ? solve<kLaneFloats>(problem, config, state, workspace)
+                                       : solve<kSimplexStride>(problem, config, state, workspace);
+    std::copy_n(state.coefficients.begin(), problem.count, c.begin());
+    return report;
+}
+
+}  // namespace rig
