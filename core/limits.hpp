@@ -45,6 +45,10 @@ static_assert(kMaxPoints >= 2 * kMaxMarkers);
 static_assert(4 * (kMaxRows * kMaxShapes + kMaxRbfDimensions * kMaxRows + kMaxRbfCentres * kMaxRbfDimensions +
                    kMaxRbfCentres * kMaxShapes) <=
               kMaxPackBytes / 2);
+// ... and the largest regional one: examples, their origins, their shapes, blends
+static_assert(4 * kMaxRegions *
+                  (kMaxRows * (kMaxRegionShapes + 3) + kMaxRegionShapes * kMaxShapes + kMaxShapes) <=
+              kMaxPackBytes / 2);
 static_assert(kMaxModes <= kMaxShapes);
 static_assert(kMaxDotDiameterPx + 16 <= kBlobWindowPx);
 static_assert(kMaxCandidates >= kMaxObservations);

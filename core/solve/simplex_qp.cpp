@@ -13,15 +13,16 @@ namespace rig {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-// An example whose part outside the affine span of those in use is under this share of its square counts as
-// dependent on them: what float's rounding leaves of it says nothing.
-constexpr float kDependent = 4e-6F;
-constexpr float kLeastShift_mm2 = 1e-8F;    // examples within 0.1 um of each other are equal
-constexpr float kAccepted = 4.0F;           // tolerances: rounding leaves this much on ill-conditioned faces
-constexpr float kLostSum = 0.25F;           // coefficients whose sum is off by this came from no inverse
-constexpr int kRefinements = 3;             // each gains the inverse's own accuracy once more
-constexpr float kEnterShare = 0.25F;        // of the hardest pull
-constexpr float kSameValue = 1e-6F;         // objectives closer than this differ by rounding
+constexpr float kLeastShift_mm2 = 1e-8F;  // examples within 0.1 um of each other are equal
+// What must be left of an example's square beyond those in use, as a share of it: a quarter of the tilt. Less comes
+// from an inverse that is worn.
+constexpr float kLeastRest = 0.25F * kSimplexTilt;
+constexpr float kAccepted = 4.0F;     // tolerances: rounding leaves this much on ill-conditioned faces
+constexpr float kLostSum = 0.25F;     // coefficients whose sum is off by this came from no inverse
+constexpr int kRefinements = 4;       // each gains the inverse's own accuracy once more
+constexpr float kEnterShare = 0.25F;  // of the hardest pull
+constexpr float kSameValue = 1e-6F;   // objectives closer than this differ by rounding
+constexpr int kMostRebuilds = 3;      // of a worn inverse in one frame
 constexpr int kChangesBeforeRebuild = 256;  // each leaves its rounding in the inverse
 constexpr int kPatience = 3;                // exchanges that may pass without a better objective
 
@@ -66,12 +67,11 @@ class FaceWalk {
     bool exchange();
     bool sharpen_fully();
     [[nodiscard]] float objective_at_aim() const;
+    void take_out(Set leaving);
     bool bring_in(Set entering);
     bool restore();
     bool step();
-    bool aim_directly();
-    bool sharpen();
-    bool bring_to_sum(Row aim);
+    bool aim_from(const float* point);
     void measure(const float* at);
     [[nodiscard]] Set wanted() const;
     bool walk();
@@ -81,9 +81,8 @@ class FaceWalk {
     bool add(std::size_t i);
     void remove(std::size_t i);
     void add_outer_to_inverse(float factor, const float* u);
-    bool slide(std::size_t i);
     bool rebuild();
-    bool rebuild_once();
+    bool rebuild_again();
     void mark(std::size_t i, bool in_use);
     void certify();
 
@@ -93,14 +92,16 @@ class FaceWalk {
     SimplexQpWorkspace& ws_;
     SimplexQpReport& report_;
     std::size_t n_;
+    float tilt_ = 0.0F;
     float enough_ = 0.0F;    // tolerance at the size of this frame's numbers
     float lambda_ = 0.0F;    // the pull that all examples in use share
     float residual_ = 0.0F;  // largest Jacobi move among them
     float aim_sum_ = 1.0F;
-    Set negative_ = 0;  // of the aim
-    Set skipped_ = 0;   // dependent on those in use, with nothing to gain
-    bool rebuilt_ = false;
-    bool measured_ = false;         // pull and lambda belong to the coefficients
+    Set negative_ = 0;       // of the aim
+    Set skipped_ = 0;        // came in for nothing but rounding
+    int mended_ = 0;
+    bool rebuilding_ = false;
+    bool measured_ = false;  // pull, move and lambda belong to the coefficients
     std::size_t entered_ = kWidth;  // last
     std::size_t standstills_ = 0;
 };
@@ -144,6 +145,7 @@ bool FaceWalk<kWidth>::adopt_rows() {
     const float* target = whole ? p_.target.data() : ws_.weighted.data();
     combine_rows(p_.examples.data(), kWidth, target, p_.rows, kWidth, nullptr, ws_.linear.data());
     if (changed) adopt_gram();
+    tilt_ = kSimplexTilt * s_.shift;
     const float size = Row(ws_.linear.data()).magnitude().largest();
     enough_ = config_.tolerance * std::max(1.0F, size / s_.shift);
     return true;
@@ -173,6 +175,7 @@ void FaceWalk<kWidth>::adopt_gram() {
     for (std::size_t i = 0; i < n_; ++i) trace += gram_row(i)[i];
     // Any shift is right; this one has the size of the other eigenvalues.
     s_.shift = finite(trace) ? std::max(trace / static_cast<float>(n_), kLeastShift_mm2) : 1.0F;
+    tilt_ = kSimplexTilt * s_.shift;
     s_.inverse_diagonal.fill(0.0F);
     for (std::size_t i = 0; i < n_; ++i) s_.inverse_diagonal[i] = 1.0F / (gram_row(i)[i] + s_.shift);
     s_.version = p_.version;
@@ -201,19 +204,20 @@ void FaceWalk<kWidth>::start_cold() {
     static_cast<void>(rebuild());  // one example is never dependent
 }
 
-// Yesterday's set, changed by several examples at once: all whose coefficient on its affine span is negative
-// leave together; where none is, all that pull hardest come in. It goes on as long as every such feasible
-// point is better than the one before, which cannot go round in circles; then, and where examples depend on
-// each other, the walk that changes one at a time takes over. The coefficients are the best feasible point so
-// far. True: optimal.
+// Yesterday's set, changed by several examples at once: all whose coefficient on its affine span is negative leave
+// together; where none is, all that pull hardest come in. It goes on as long as every such feasible point is better
+// than the one before, which cannot go round in circles; then the walk that changes one at a time takes over. The
+// coefficients are the best feasible point so far. True: optimal.
 template <std::size_t kWidth>
 bool FaceWalk<kWidth>::exchange() {
     float best = kInfinity;
     int patience = kPatience;
-    while (report_.iterations < config_.iteration_cap && aim_directly()) {
+    measure(s_.coefficients.data());
+    Row(s_.coefficients.data()).store(ws_.point.data());
+    while (report_.iterations < config_.iteration_cap && aim_from(ws_.point.data())) {
         ++report_.iterations;
         if (negative_ != 0) {
-            for (Set leaving = negative_; leaving != 0;) remove(take_first(leaving));
+            take_out(negative_);
             continue;
         }
         if (!sharpen_fully()) return restore();
@@ -221,7 +225,9 @@ bool FaceWalk<kWidth>::exchange() {
         if (!(objective <= best + kSameValue * std::fabs(objective))) return restore();
         if (!(objective < best) && --patience == 0) return false;
         best = std::min(best, objective);
-        ((1.0F / aim_sum_) * Row(ws_.aim.data())).store(s_.coefficients.data());
+        const Row point = (1.0F / aim_sum_) * Row(ws_.aim.data());
+        point.store(ws_.point.data());
+        point.store(s_.coefficients.data());
         s_.settled = s_.used;
         measured_ = true;
         const Set entering = wanted();
@@ -231,27 +237,13 @@ bool FaceWalk<kWidth>::exchange() {
     return restore();
 }
 
-// Back to the best feasible point, with the examples that were in use there. Always false.
-template <std::size_t kWidth>
-bool FaceWalk<kWidth>::restore() {
-    for (Set leaving = s_.used & ~s_.settled; leaving != 0;) remove(take_first(leaving));
-    for (Set entering = s_.settled & ~s_.used; entering != 0;) {
-        if (add(take_first(entering))) continue;
-        s_.used = s_.settled;
-        if (!rebuild()) start_cold();
-        break;
-    }
-    return false;
-}
-
-// Measures the aim and sharpens it until the inverse's error is gone. False when that made a coefficient
-// negative.
+// Measures the aim and sharpens it until the inverse's error is gone. False when that made a coefficient negative.
 template <std::size_t kWidth>
 bool FaceWalk<kWidth>::sharpen_fully() {
     measure(ws_.aim.data());
     for (int i = 0; i < kRefinements && residual_ > enough_; ++i) {
         const float before = residual_;
-        if (!sharpen() || negative_ != 0) return false;
+        if (!aim_from(ws_.aim.data()) || negative_ != 0) return false;
         measure(ws_.aim.data());
         if (!(residual_ < 0.5F * before)) break;
     }
@@ -263,48 +255,73 @@ float FaceWalk<kWidth>::objective_at_aim() const {
     return -0.5F * (Row(ws_.aim.data()) * (Row(ws_.pull.data()) + Row(ws_.linear.data()))).sum();
 }
 
-// From the coefficients at hand to the minimum of their face, and on to the next. False: nothing is left to
-// do.
+// Their coefficients go from the point, which changes the pull of the others.
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::take_out(Set leaving) {
+    Row pull(ws_.pull.data());
+    while (leaving != 0) {
+        const std::size_t i = take_first(leaving);
+        pull += ws_.point[i] * Row(gram_row(i));
+        ws_.point[i] = 0.0F;
+        remove(i);
+    }
+    pull.store(ws_.pull.data());
+}
+
+// Those that pull nearly as hard as the hardest; the others may not want to any more once these are in. False
+// when the inverse does not take one.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::bring_in(Set entering) {
+    float largest = 0.0F;
+    for (Set set = entering; set != 0;) largest = std::max(largest, ws_.move[take_first(set)]);
+    entering &= Row(ws_.move.data()).above(kEnterShare * largest);
+    while (entering != 0) {
+        if (!add(take_first(entering))) return false;
+    }
+    return true;
+}
+
+// Back to the best feasible point, with the examples that were in use there. Always false.
+template <std::size_t kWidth>
+bool FaceWalk<kWidth>::restore() {
+    measured_ = false;
+    for (Set leaving = s_.used & ~s_.settled; leaving != 0;) remove(take_first(leaving));
+    for (Set entering = s_.settled & ~s_.used; entering != 0;) {
+        if (add(take_first(entering))) continue;
+        s_.used = s_.settled;
+        if (!rebuild()) start_cold();
+        break;
+    }
+    return false;
+}
+
+// From the coefficients at hand to the minimum of their face, and on to the next. False: nothing is left to do.
 template <std::size_t kWidth>
 bool FaceWalk<kWidth>::step() {
-    if (!aim_directly()) return rebuild_once();
+    measure(s_.coefficients.data());
+    if (!aim_from(s_.coefficients.data())) return rebuild_again();
     if (!walk()) return true;
     measure(s_.coefficients.data());
     for (int i = 0; i < kRefinements && residual_ > enough_; ++i) {
         const float before = residual_;
-        ws_.aim = s_.coefficients;
-        if (!sharpen()) return rebuild_once();
+        if (!aim_from(s_.coefficients.data())) return rebuild_again();
         if (!walk()) return true;
         measure(s_.coefficients.data());
         if (!(residual_ < 0.5F * before)) break;
     }
     measured_ = true;
-    if (residual_ > kAccepted * enough_ && rebuild_once()) return true;
+    if (residual_ > kAccepted * enough_ && rebuild_again()) return true;
     return enter();
 }
 
-// aim := the minimum on the affine span of the examples in use: inverse (linear - lambda 1), lambda such that
-// it sums to 1. False: the inverse is worn out.
+// aim := the minimum on the affine span of the examples in use: the point + inverse (pull - lambda 1), lambda such
+// that it sums to 1. From a point near by, the inverse's own error hardly counts. False: the inverse is worn out.
 template <std::size_t kWidth>
-bool FaceWalk<kWidth>::aim_directly() {
-    Row aim(0.0F);
-    aim.add_rows(s_.inverse.data(), ws_.linear.data(), n_);
-    return bring_to_sum(aim);
-}
-
-// The same from the pull at the aim, which takes away most of the inverse's own error.
-template <std::size_t kWidth>
-bool FaceWalk<kWidth>::sharpen() {
-    Row aim(ws_.aim.data());
-    aim.add_rows(s_.inverse.data(), ws_.pull.data(), n_);
-    return bring_to_sum(aim);
-}
-
-template <std::size_t kWidth>
-bool FaceWalk<kWidth>::bring_to_sum(Row aim) {
+bool FaceWalk<kWidth>::aim_from(const float* point) {
     const Row sums(s_.inverse_sums.data());
-    const float along = (1.0F - aim.sum()) / sums.sum();
-    aim += along * sums;
+    Row aim(point);
+    aim.add_rows(s_.inverse.data(), ws_.pull.data(), n_);
+    aim += ((1.0F - aim.sum()) / sums.sum()) * sums;
     aim.store(ws_.aim.data());
     aim_sum_ = aim.sum();
     negative_ = (Row(0.0F) - aim).above(0.0F);
@@ -315,7 +332,7 @@ bool FaceWalk<kWidth>::bring_to_sum(Row aim) {
 template <std::size_t kWidth>
 void FaceWalk<kWidth>::measure(const float* at) {
     const Row point(at);
-    Row fitted(0.0F);
+    Row fitted = tilt_ * point;
     fitted.add_rows(gram(), at, n_);
     const Row pull = Row(ws_.linear.data()) - fitted;
     lambda_ = (point * pull).sum();
@@ -329,19 +346,6 @@ void FaceWalk<kWidth>::measure(const float* at) {
 template <std::size_t kWidth>
 Set FaceWalk<kWidth>::wanted() const {
     return Row(ws_.move.data()).above(enough_) & ~s_.used & ~skipped_;
-}
-
-// Those that pull nearly as hard as the hardest; the others may not want to any more once these are in. False
-// when one depends on those in use.
-template <std::size_t kWidth>
-bool FaceWalk<kWidth>::bring_in(Set entering) {
-    float largest = 0.0F;
-    for (Set set = entering; set != 0;) largest = std::max(largest, ws_.move[take_first(set)]);
-    entering &= Row(ws_.move.data()).above(kEnterShare * largest);
-    while (entering != 0) {
-        if (!add(take_first(entering))) return false;
-    }
-    return true;
 }
 
 // Towards the aim as far as the coefficients stay non-negative. True when it was reached; else the example
@@ -371,7 +375,7 @@ bool FaceWalk<kWidth>::walk() {
     standstills_ = length > 0.0F ? 0 : standstills_ + 1;
     remove(blocking);
     // It came in for nothing but rounding: the inverse's, or the pull's.
-    if (blocking == entered_ && length == 0.0F && !rebuild_once()) skipped_ |= bit(blocking);
+    if (blocking == entered_ && length == 0.0F && !rebuild_again()) skipped_ |= bit(blocking);
     return false;
 }
 
@@ -392,28 +396,30 @@ bool FaceWalk<kWidth>::enter() {
             if (ws_.move[i] > ws_.move[best]) best = i;
         }
         entered_ = best;
-        if (add(best) || slide(best)) return true;
+        if (add(best)) return true;
         skipped_ |= bit(best);
     }
     return false;
 }
 
-// projection := inverse (Gram_i + shift 1); returns what the diagonal keeps beyond it.
+// projection := inverse (Gram_i + shift 1 + tilt e_i); returns what the diagonal keeps beyond it.
 template <std::size_t kWidth>
 float FaceWalk<kWidth>::project(std::size_t i) {
     const Row column = Row(gram_row(i)) + Row(s_.shift);
     column.store(ws_.column.data());
+    ws_.column[i] += tilt_;
     Row projection(0.0F);
     projection.add_rows(s_.inverse.data(), ws_.column.data(), n_);
     projection.store(ws_.projection.data());
-    return ws_.column[i] - (column * projection).sum();
+    return ws_.column[i] - (column * projection).sum();  // the projection is zero at i
 }
 
-// Bordering: inverse += u u^T / rest, u = projection - e_i. False when the example depends on those in use.
+// Bordering: inverse += u u^T / rest, u = projection - e_i. False when the inverse is too worn for it.
 template <std::size_t kWidth>
 bool FaceWalk<kWidth>::add(std::size_t i) {
-    const float rest = project(i);
-    if (!(rest * s_.inverse_diagonal[i] > kDependent)) return false;
+    float rest = project(i);
+    if (!(rest * s_.inverse_diagonal[i] > kLeastRest) && !rebuilding_ && rebuild_again()) rest = project(i);
+    if (!(rest * s_.inverse_diagonal[i] > kLeastRest)) return false;
     ws_.projection[i] = -1.0F;
     const float scale = 1.0F / rest;
     add_outer_to_inverse(scale, ws_.projection.data());
@@ -456,75 +462,47 @@ void FaceWalk<kWidth>::mark(std::size_t i, bool in_use) {
     s_.used_lane[i] = in_use ? 1.0F : 0.0F;
 }
 
-// Example i is an affine combination (projection) of those in use, so its coefficient can grow at their cost
-// without a curvature to stop it: until the first of theirs is zero and leaves, and so on until what is left
-// in use does not hold example i any more and it comes in. False: the numbers do not allow it.
-template <std::size_t kWidth>
-bool FaceWalk<kWidth>::slide(std::size_t i) {
-    measured_ = false;
-    for (std::size_t pass = 0; pass < n_; ++pass) {
-        float length = kInfinity;
-        std::size_t blocking = kWidth;
-        for (Set set = s_.used; set != 0;) {
-            const std::size_t k = take_first(set);
-            if (!(ws_.projection[k] > kDependent)) continue;
-            const float room = s_.coefficients[k] / ws_.projection[k];
-            if (!(room < length)) continue;
-            length = room;
-            blocking = k;
-        }
-        if (blocking == kWidth) return false;
-        const float reached = s_.coefficients[i] + length;
-        const Row taken = length * (Row(ws_.projection.data()) * Row(s_.used_lane.data()));
-        (Row(s_.coefficients.data()) - taken).above_zero().store(s_.coefficients.data());
-        s_.coefficients[i] = reached;
-        s_.coefficients[blocking] = 0.0F;
-        keep_sum();
-        standstills_ = length > 0.0F ? 0 : standstills_ + 1;
-        remove(blocking);
-        if (add(i)) return true;
-    }
-    start_cold();
-    return false;
-}
-
 // The inverse from nothing, over the examples in use. False when they depend on each other.
 template <std::size_t kWidth>
 bool FaceWalk<kWidth>::rebuild() {
     ++report_.rebuilds;
-    s_.changes_since_rebuild = 0;
+    rebuilding_ = true;
     std::fill_n(s_.inverse.begin(), n_ * kWidth, 0.0F);
     s_.inverse_sums.fill(0.0F);
     s_.used_lane.fill(0.0F);
     Set wanted = s_.used;
     s_.used = 0;
-    while (wanted != 0) {
-        if (!add(take_first(wanted))) return false;
-    }
-    return true;
+    bool whole = true;
+    while (wanted != 0 && whole) whole = add(take_first(wanted));
+    rebuilding_ = false;
+    s_.changes_since_rebuild = 0;
+    return whole;
 }
 
-// A worn inverse is made anew once a frame. False: that was done already.
+// For an inverse that shows its wear, a few times a frame. False: that was done already.
 template <std::size_t kWidth>
-bool FaceWalk<kWidth>::rebuild_once() {
-    if (rebuilt_) return false;
-    rebuilt_ = true;
+bool FaceWalk<kWidth>::rebuild_again() {
+    if (mended_ == kMostRebuilds) return false;
+    ++mended_;
     if (!rebuild()) start_cold();
     return true;
 }
 
 template <std::size_t kWidth>
 void FaceWalk<kWidth>::certify() {
-    if (!measured_) measure(s_.coefficients.data());
+    measure(s_.coefficients.data());
     const Row c(s_.coefficients.data());
-    const Row pull(ws_.pull.data());
-    const Row target = (c + Row(ws_.move.data())).above_zero();
-    report_.kkt = (c - target).magnitude().largest();
+    // Of the problem itself: without the tilt.
+    const Row pull = Row(ws_.pull.data()) + tilt_ * c;
+    lambda_ = (c * pull).sum();
+    const Row move = (pull - Row(lambda_)) * Row(s_.inverse_diagonal.data());
+    report_.kkt = (c - (c + move).above_zero()).magnitude().largest();
+    pull.store(ws_.pull.data());
     float highest = lambda_;
     for (std::size_t i = 0; i < n_; ++i) highest = std::max(highest, ws_.pull[i]);
     report_.gap = highest - lambda_;
     report_.objective = -0.5F * (c * (pull + Row(ws_.linear.data()))).sum();
-    report_.optimal = report_.kkt <= kAccepted * enough_;
+    report_.optimal = report_.kkt <= kAccepted * enough_ + kSimplexTilt;
 }
 
 template <std::size_t kWidth>

@@ -8,8 +8,7 @@
 //
 // Because the coefficients sum to 1, taking the mean example from both sides changes the size of the numbers
 // and nothing else; without it the Gram matrix holds the squared positions, of which float keeps too little.
-// For the same reason G^T V G + shift 1 1^T has the same minimum for every shift, and is positive definite
-// whenever no example is an affine combination of the others.
+// For the same reason G^T V G + shift 1 1^T has the same minimum for every shift.
 //
 // An exact active set: exchanges of several examples at once, and a primal walk where those do not end. What
 // is returned is feasible wherever it stops; the optimal value does not depend on the start, and neither do
@@ -28,6 +27,11 @@
 namespace rig {
 
 inline constexpr std::size_t kSimplexStride = padded(kMaxRegionShapes);
+
+// Added to the diagonal of G^T V G, as a share of its mean: examples that depend on each other have one answer then,
+// the most even one, at an objective that is above the optimum by no more than half the tilt. It is the least that
+// float can tell from rounding.
+inline constexpr float kSimplexTilt = 4e-6F;
 
 // Measured coordinates beyond this (a thousand faces away) count as hidden, as those that are not finite do.
 inline constexpr float kMaxSimplexTarget = 1e6F;
@@ -75,6 +79,7 @@ struct SimplexQpWorkspace {
     alignas(64) std::array<float, kSimplexStride> linear{};  // G^T V g
     alignas(64) std::array<float, kSimplexStride> pull{};    // G^T V (g - G c), minus half the gradient
     alignas(64) std::array<float, kSimplexStride> move{};    // of a Jacobi step
+    alignas(64) std::array<float, kSimplexStride> point{};      // from which the next aim is taken
     alignas(64) std::array<float, kSimplexStride> aim{};     // minimum of the face
     alignas(64) std::array<float, kSimplexStride> column{};  // of the update
     alignas(64) std::array<float, kSimplexStride> projection{};

@@ -99,6 +99,23 @@ void run_rbf(const SolverConfig& config, const InferenceOutput& completed, Solve
     report.hull_distance = rbf.nearest_widths;
 }
 
+void run_regional(const SolverConfig& config, SolverState& state, SolverWorkspace& w, SolverOutput& output,
+                  SolverReport& report) {
+    const SolvePack& pack = config.pack;
+    const RegionalInput input{
+        {w.positions_mm.data(), pack.marker_count}, {w.weights.data(), pack.marker_count}, output.confidence};
+    solve_regions(pack, config.regional, input, state.regional, w.regional, w.qp, output.regional,
+                  output.weights);
+    report.optimal = true;
+    for (std::size_t r = 0; r < pack.region_count; ++r) {
+        const RegionReport& region = output.regional.regions[r];
+        report.optimal = report.optimal && region.optimal;
+        report.kkt = std::max(report.kkt, region.kkt);
+        report.iterations = static_cast<std::uint16_t>(report.iterations + region.iterations);
+        report.objective_mm2 += region.objective_mm2;
+    }
+}
+
 }  // namespace
 
 void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& workspace,
@@ -106,6 +123,7 @@ void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& wo
     config.pack = pack;
     config.rate_hz = rate_hz;
     build_normal_tables(pack, config.tables);
+    build_regional_tables(pack, config.regional);
     for (std::size_t i = 0; i < pack.shape_count; ++i) {
         workspace.equations.data_diagonal[i] = config.tables.full_gram[i * kMaxShapes + i];
     }
@@ -146,6 +164,8 @@ void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const
     }
     if (pack.solver == SolverKind::kRbf) {
         run_rbf(config, completed, w, output, report);
+    } else if (is_regional(pack.solver)) {
+        run_regional(config, state, w, output, report);
     } else {
         run_quadratic(config, state, w, output, report);
     }

@@ -13,6 +13,7 @@
 #include "core/solve/confidence.hpp"
 #include "core/solve/normal_equations.hpp"
 #include "core/solve/rbf.hpp"
+#include "core/solve/regional.hpp"
 #include "core/stabilise/stabilised_markers.hpp"
 
 namespace rig {
@@ -21,6 +22,7 @@ struct SolverConfig {
     SolvePack pack;       // spans; the bytes outlive the solver
     NormalTables tables;  // built once
     BoxQpConfig qp;
+    RegionalTables regional;  // of a regional pack
     double rate_hz = 60.0;
     double forget_s = 0.25;  // the temporal prior starts anew after a gap of this length
     std::array<float, kMaxShapes> full_confidence{};  // of each weight when every marker is seen
@@ -28,6 +30,7 @@ struct SolverConfig {
 
 struct SolverState {
     BoxQpState qp;
+    RegionalState regional;
     bool has_previous = false;
     std::int64_t previous_us = 0;
     std::array<double, kMaxShapes> previous{};
@@ -41,6 +44,7 @@ struct SolverWorkspace {
     NormalEquations equations;
     BoxQpWorkspace qp;
     RbfWorkspace rbf;
+    RegionalWorkspace regional;
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> weights{};
     std::array<double, kMaxShapes> low{};
@@ -52,13 +56,15 @@ struct SolverWorkspace {
 struct SolverOutput {
     std::array<double, kMaxShapes> weights{};    // inside [low, high] of the pack
     std::array<float, kMaxShapes> confidence{};  // 0..1, see confidence.hpp
+    RegionalOutput regional;                     // of a regional pack: coefficients and certificates
 };
 
 struct SolverReport {
     bool solved = false;  // false: nothing was seen; weights are the previous ones, or the rest pose
     bool optimal = false;
     double kkt = 0.0;  // of the pack's problem at the answer, before any clamping of least squares
-    double objective_mm2 = 0.0;
+    double objective_mm2 =
+        0.0;  // regional packs: the sum over regions, as iterations are; kkt is their worst
     std::uint16_t iterations = 0;
     std::uint16_t markers_used = 0;
     double residual_rms_mm = 0.0;

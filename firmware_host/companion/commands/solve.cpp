@@ -40,11 +40,15 @@ struct SolveResults {
     NpyArray<float> points;
 };
 
-const std::vector<std::string>& report_columns() {
-    static const std::vector<std::string> columns{
+std::vector<std::string> report_columns(const SolvePack& pack) {
+    std::vector<std::string> columns{
         "frame",        "state",           "kkt",         "objective",   "iterations",
         "markers_used", "residual_rms_mm", "slip_rx_rad", "slip_ry_rad", "slip_rz_rad",
         "slip_tx_mm",   "slip_ty_mm",      "slip_tz_mm"};
+    for (std::size_t r = 0; r < pack.region_count; ++r) {
+        columns.push_back(fmt::format("{}_residual_mm", pack.regions[r].name));
+        columns.push_back(fmt::format("{}_confidence", pack.regions[r].name));
+    }
     return columns;
 }
 
@@ -89,24 +93,30 @@ Result<void, FileError> check_stream(const SolveOptions& options, const SolvePac
                               options.markers, stream.shape[1], options.pack, pack.marker_count)});
 }
 
-void add_report_row(std::size_t frame, const FaceState& state, const FrameReport& report, CsvWriter& csv) {
+void add_report_row(std::size_t frame, const SolvePack& pack, const FaceState& state,
+                    const FrameReport& report, const RegionalOutput& regions, CsvWriter& csv) {
     csv.integer(static_cast<std::int64_t>(frame)).text(state_name(state.state));
     csv.number(report.kkt, 12).number(report.objective_mm2, 6).integer(report.iterations);
     csv.integer(report.markers_used).number(report.residual_rms_mm, 6);
     for (const float r : state.slip.rotation_rad) csv.number(static_cast<double>(r), 7);
     for (const float t : state.slip.translation_mm) csv.number(static_cast<double>(t), 5);
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    for (std::size_t r = 0; r < pack.region_count; ++r) {
+        csv.number(report.solved ? regions.regions[r].residual_rms_mm : kNone, 6);
+        csv.number(report.solved ? static_cast<double>(regions.regions[r].confidence) : kNone, 4);
+    }
     csv.end_row();
 }
 
 void add_results(const SolveOptions& options, const SolvePack& pack, std::size_t frame,
-                 const FaceState& state, const FrameReport& report, std::size_t slots,
-                 SolveResults& results) {
+                 const FaceState& state, const FrameReport& report, const RegionalOutput& regions,
+                 std::size_t slots, SolveResults& results) {
     results.weights.integer(static_cast<std::int64_t>(frame));
     results.weights.number(static_cast<double>(frame) / options.rate_hz, 6);
     for (std::size_t i = 0; i < pack.shape_count; ++i)
         results.weights.number(static_cast<double>(state.weights[i]), 6);
     results.weights.end_row();
-    add_report_row(frame, state, report, results.report);
+    add_report_row(frame, pack, state, report, regions, results.report);
     for (std::size_t s = 0; s < slots; ++s) results.labels.values.push_back(report.labels[s]);
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -157,7 +167,7 @@ int solve_frames(const SolveOptions& options, const SolvePack& pack, const NpyAr
             pipeline.step(LabelledFrame{capture_us, positions}, *state, *report);
             label_own_rows(pipeline, positions, *report);
         }
-        add_results(options, pack, frame, *state, *report, slots, results);
+        add_results(options, pack, frame, *state, *report, pipeline.regions(), slots, results);
         progress.update(frame + 1);
     }
     return kExitOk;
@@ -202,7 +212,7 @@ int run_solve(const SolveOptions& options) {
         print_error(options.pack + ": the solver refuses this pack; train it again with this version");
         return kExitInput;
     }
-    SolveResults results{CsvWriter(weight_columns(pack)), CsvWriter(report_columns()), {}, {}};
+    SolveResults results{CsvWriter(weight_columns(pack)), CsvWriter(report_columns(pack)), {}, {}};
     results.labels.shape = {stream->shape[0], stream->shape[1]};
     results.points.shape = {stream->shape[0], pack.marker_count, 3};
     install_interrupt_handler();

@@ -26,6 +26,7 @@ struct TrainCommand {
     std::string cameras;
     std::string temporal = "auto";
     std::string name;
+    std::string method = "spread";
     std::vector<std::string> takes;
     TrainOptions options;
     PackIdentity identity;
@@ -53,6 +54,10 @@ void print_result(const TrainCommand& command, const TrainedPack& pack) {
                pack.report.condition);
     fmt::print("noise {:.4g} mm, sparsity {:.4g} mm^2, ridge {:.4g} mm^2\n", pack.noise_mm, pack.sparsity_mm2,
                pack.ridge_mm2);
+    for (const TrainedRegion& region : pack.regions) {
+        fmt::print("region {}: {} markers, {} examples\n", region.name, region.markers.size(),
+                   region.example_count);
+    }
     if (!pack.report.rbf) return;
     const RbfTrainingReport& rbf = *pack.report.rbf;
     fmt::print(
@@ -111,6 +116,12 @@ int run_train(TrainCommand& command) {
                         command.temporal));
         return kExitUsage;
     }
+    const auto method = key_shape_method(command.method);
+    if (!method) {
+        print_error(fmt::format("--method {}: give spread, clusters2, clusters3 or hull", command.method));
+        return kExitUsage;
+    }
+    command.options.regional.method = *method;
     if (const std::string fault = fault_of_options(command.options, command.takes.size()); !fault.empty()) {
         print_error(fault);
         return kExitUsage;
@@ -152,12 +163,15 @@ void add_train_verb(CLI::App& app, int& exit_code) {
     const std::map<std::string, SolverKind> solvers = {{"boxqp", SolverKind::kBoxQp},
                                                        {"nnls", SolverKind::kNonNegative},
                                                        {"rbf", SolverKind::kRbf},
-                                                       {"lsq", SolverKind::kLeastSquares}};
-    verb->add_option("--solver", command->options.solver, "boxqp, nnls, rbf or lsq")
+                                                       {"lsq", SolverKind::kLeastSquares},
+                                                       {"keyshapes", SolverKind::kKeyShapes},
+                                                       {"examples", SolverKind::kExamples}};
+    verb->add_option("--solver", command->options.solver, "boxqp, nnls, rbf, lsq, keyshapes or examples")
         ->transform(CLI::CheckedTransformer(solvers, CLI::ignore_case).description(""))
         ->type_name("NAME")
         ->default_str("boxqp");
-    verb->add_option("--take", command->takes, "performances to learn from (CSV); rbf needs one")
+    verb->add_option("--take", command->takes,
+                     "performances to learn from (CSV); rbf, keyshapes and examples need one")
         ->type_name("CSV...");
     verb->add_option("--cameras", command->cameras,
                      "cameras.json of the helmet; without it the pack solves marker streams only")
@@ -187,6 +201,17 @@ void add_train_verb(CLI::App& app, int& exit_code) {
                      "components of the rbf; 0: by cross-validation")
         ->capture_default_str()
         ->type_name("D");
+    verb->add_option("--method", command->method,
+                     "choice of key shapes: spread, clusters2, clusters3 or hull")
+        ->capture_default_str()
+        ->type_name("NAME");
+    verb->add_option("--key-shapes", command->options.regional.key_shapes, "key shapes of a region")
+        ->capture_default_str()
+        ->type_name("K");
+    verb->add_option("--examples", command->options.regional.examples,
+                     "examples of the face, the neutral one among them")
+        ->capture_default_str()
+        ->type_name("K");
     verb->add_option("--name", command->name, "name inside the pack [the file's]")->type_name("NAME");
     verb->add_option("--pack-version", command->identity.pack_version, "version inside the pack")
         ->capture_default_str();

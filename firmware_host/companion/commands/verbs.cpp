@@ -9,6 +9,7 @@ void add_all_verbs(CLI::App& app, int& exit_code) {
     add_import_verb(app, exit_code);
     add_world_verb(app, exit_code);
     add_train_verb(app, exit_code);
+    add_keyshapes_verb(app, exit_code);
     add_pack_verb(app, exit_code);
     add_solve_verb(app, exit_code);
     add_detect_verb(app, exit_code);

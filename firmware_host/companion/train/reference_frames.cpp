@@ -62,11 +62,7 @@ void move_to_means(const MatrixXd& rows, const std::vector<Index>& owner, Matrix
 
 }  // namespace
 
-std::vector<Index> choose_reference_frames(const MatrixXd& points, std::size_t count) {
-    const Index stride = std::max<Index>(1, points.rows() / kClusteredFrames);
-    const Index kept = (points.rows() + stride - 1) / stride;
-    MatrixXd rows(kept, points.cols());
-    for (Index r = 0; r < kept; ++r) rows.row(r) = points.row(r * stride);
+FrameClusters cluster_frames(const MatrixXd& rows, std::size_t count) {
     const std::vector<Index> spread = widest_spread(rows, std::max<std::size_t>(count, 1));
     MatrixXd centres(static_cast<Index>(spread.size()), rows.cols());
     for (std::size_t k = 0; k < spread.size(); ++k) centres.row(static_cast<Index>(k)) = rows.row(spread[k]);
@@ -77,6 +73,15 @@ std::vector<Index> choose_reference_frames(const MatrixXd& points, std::size_t c
         owner = std::move(now);
         move_to_means(rows, owner, centres);
     }
+    return {std::move(centres), std::move(owner)};
+}
+
+std::vector<Index> choose_reference_frames(const MatrixXd& points, std::size_t count) {
+    const Index stride = std::max<Index>(1, points.rows() / kClusteredFrames);
+    const Index kept = (points.rows() + stride - 1) / stride;
+    MatrixXd rows(kept, points.cols());
+    for (Index r = 0; r < kept; ++r) rows.row(r) = points.row(r * stride);
+    const MatrixXd centres = cluster_frames(rows, count).centres;
     std::vector<Index> chosen;
     for (Index k = 0; k < centres.rows(); ++k) {
         Index nearest = 0;

@@ -107,6 +107,11 @@ std::string fault_of_options(const TrainOptions& options, std::size_t take_count
                "shape), or "
                "choose --solver boxqp, which needs none";
     }
+    if (is_regional(options.solver) && take_count == 0) {
+        return "regions take their shapes from a performance: give one with --take T.csv (frame,time_s and "
+               "one "
+               "column a shape), or choose --solver boxqp, which needs none";
+    }
     return {};
 }
 
@@ -134,6 +139,8 @@ SolvePack TrainedPack::view() const {
     out.rbf.widths_mm = rbf.widths_mm;
     out.rbf.weights = rbf.weights;
     out.rbf.offset = rbf.offset;
+    out.region_count = static_cast<std::uint8_t>(std::min(regions.size(), kMaxRegions));
+    for (std::size_t r = 0; r < out.region_count; ++r) out.regions[r] = regions[r].view();
     out.camera_count = static_cast<std::uint8_t>(cameras.size());
     std::ranges::copy(cameras, out.cameras.begin());
     std::ranges::copy(shape_names, out.shape_names.begin());
@@ -165,6 +172,12 @@ Result<TrainedPack, FileError> train(const Rig& rig, const MarkerLayout& layout,
         if (!trained) return failure(trained.error());
         pack.rbf = std::move(trained->model);
         pack.report.rbf = trained->report;
+    }
+    if (is_regional(options.solver)) {
+        auto regions = train_regions(options.solver, layout, pack.neutral_mm, pack.basis_mm, options.takes,
+                                     options.regional);
+        if (!regions) return failure(regions.error());
+        pack.regions = std::move(*regions);
     }
     return pack;
 }

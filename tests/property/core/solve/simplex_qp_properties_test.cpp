@@ -74,7 +74,8 @@ std::vector<double> random_position(const std::vector<double>& raw, const test::
     return position;
 }
 
-// What float can promise of the objective: rounding of the Gram matrix against the size of the problem.
+// What float can promise of the objective: rounding of the Gram matrix against the size of the problem, and
+// the tolerance of a coefficient against the size of the examples.
 long double allowed(const ReferenceSimplexQp& p) {
     long double size = 0.0L;
     for (std::size_t i = 0; i < p.count; ++i) {
@@ -82,7 +83,9 @@ long double allowed(const ReferenceSimplexQp& p) {
         corner[i] = 1.0L;
         size = std::max(size, p.objective(corner));
     }
-    return 2e-6L * size + 1e-12L;
+    long double squares = 0.0L;
+    for (const long double x : p.examples) squares += x * x / static_cast<long double>(p.count);
+    return 2e-6L * size + 4e-6L * squares + 1e-12L;
 }
 
 // Random and degenerate problems, each solved cold and along a short walk: feasible, inside the cap, and as

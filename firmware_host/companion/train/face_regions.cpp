@@ -1,0 +1,189 @@
+#include "firmware_host/companion/train/face_regions.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <string_view>
+
+namespace rig::host {
+
+namespace {
+
+// Heights in shares of the way from the eyes down to the lowest marker. On two heads of light-stage scans the
+// nose ends at 0.35 and the upper lip begins at 0.45.
+constexpr double kBandTop = 0.25;
+constexpr double kBandBottom = 0.45;
+
+constexpr std::size_t kLeastOwned = 3;  // markers: nine rows, Zhang's smallest have 27 with what they share
+constexpr double kBorderShare = 0.2;    // of the face's height below the eyes: how far a border reaches
+constexpr double kLeastShare = 0.02;
+
+struct Anchor {
+    const char* name;
+    double across;  // share of the widest marker's distance from the middle, left positive
+    double up;      // share of the lowest marker's distance below the eyes
+};
+
+constexpr std::array<Anchor, 14> kAnchors{{{"forehead", 0.0, 0.45},
+                                           {"glabella", 0.0, 0.18},
+                                           {"left_eye", 0.55, 0.12},
+                                           {"right_eye", -0.55, 0.12},
+                                           {"nose", 0.0, -0.25},
+                                           {"left_cheek", 0.72, -0.2},
+                                           {"right_cheek", -0.72, -0.2},
+                                           {"left_corner", 0.45, -0.48},
+                                           {"right_corner", -0.45, -0.48},
+                                           {"upper_lip", 0.0, -0.42},
+                                           {"lower_lip", 0.0, -0.66},
+                                           {"chin", 0.0, -0.95},
+                                           {"left_jaw", 0.65, -0.75},
+                                           {"right_jaw", -0.65, -0.75}}};
+
+struct Extent {
+    double half_width_mm = 1.0;
+    double depth_mm = 1.0;  // of the lowest marker below the eyes
+};
+
+Extent extent_of(const MarkerLayout& layout) {
+    Extent extent;
+    for (const LayoutMarker& marker : layout.markers) {
+        extent.half_width_mm =
+            std::max(extent.half_width_mm, std::fabs(static_cast<double>(marker.neutral_mm[0])));
+        extent.depth_mm = std::max(extent.depth_mm, -static_cast<double>(marker.neutral_mm[1]));
+    }
+    return extent;
+}
+
+bool is_pupil(const LayoutMarker& marker) {
+    std::string name = marker.name;
+    for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return name.find("pupil") != std::string::npos || name.find("iris") != std::string::npos;
+}
+
+void add(FaceRegion& region, std::size_t marker, double blend) {
+    if (!(blend > 0.0)) return;
+    region.markers.push_back(static_cast<std::uint16_t>(marker));
+    region.blend.push_back(blend);
+}
+
+void drop_empty(std::vector<FaceRegion>& regions) {
+    std::erase_if(regions, [](const FaceRegion& region) { return region.markers.empty(); });
+}
+
+struct Nearest {
+    std::size_t first = 0;
+    std::size_t second = 0;
+    double first_mm = 0.0;
+    double second_mm = 0.0;
+};
+
+Nearest nearest_anchors(const LayoutMarker& marker, const std::vector<Anchor>& anchors,
+                        const Extent& extent) {
+    Nearest near{0, 0, HUGE_VAL, HUGE_VAL};
+    for (std::size_t a = 0; a < anchors.size(); ++a) {
+        const double x = static_cast<double>(marker.neutral_mm[0]) - anchors[a].across * extent.half_width_mm;
+        const double y = static_cast<double>(marker.neutral_mm[1]) - anchors[a].up * extent.depth_mm;
+        const double gap_mm = std::sqrt(x * x + y * y);
+        if (gap_mm < near.first_mm) {
+            near.second = near.first;
+            near.second_mm = near.first_mm;
+            near.first = a;
+            near.first_mm = gap_mm;
+        } else if (gap_mm < near.second_mm) {
+            near.second = a;
+            near.second_mm = gap_mm;
+        }
+    }
+    return near;
+}
+
+// Takes out the anchor that owns the fewest markers, while one owns too few.
+std::vector<Anchor> anchors_with_markers(const MarkerLayout& layout, const Extent& extent) {
+    std::vector<Anchor> anchors(kAnchors.begin(), kAnchors.end());
+    while (anchors.size() > 1) {
+        std::vector<std::size_t> owned(anchors.size(), 0);
+        for (const LayoutMarker& marker : layout.markers)
+            ++owned[nearest_anchors(marker, anchors, extent).first];
+        const auto fewest = std::ranges::min_element(owned);
+        if (*fewest >= kLeastOwned) break;
+        anchors.erase(anchors.begin() + (fewest - owned.begin()));
+    }
+    return anchors;
+}
+
+}  // namespace
+
+std::vector<FaceRegion> feature_regions(const MarkerLayout& layout) {
+    const Extent extent = extent_of(layout);
+    std::vector<FaceRegion> regions(3);
+    regions[0].name = "eyes";
+    regions[1].name = "mouth";
+    regions[2].name = "pupils";
+    for (std::size_t k = 0; k < layout.markers.size(); ++k) {
+        const LayoutMarker& marker = layout.markers[k];
+        if (is_pupil(marker)) {
+            add(regions[2], k, 1.0);
+            continue;
+        }
+        const double down = -static_cast<double>(marker.neutral_mm[1]) / extent.depth_mm;
+        const double mouth = std::clamp((down - kBandTop) / (kBandBottom - kBandTop), 0.0, 1.0);
+        add(regions[0], k, 1.0 - mouth);
+        add(regions[1], k, mouth);
+    }
+    drop_empty(regions);
+    return regions;
+}
+
+std::vector<FaceRegion> surface_regions(const MarkerLayout& layout) {
+    const Extent extent = extent_of(layout);
+    const std::vector<Anchor> anchors = anchors_with_markers(layout, extent);
+    std::vector<FaceRegion> regions(anchors.size());
+    for (std::size_t a = 0; a < anchors.size(); ++a) regions[a].name = anchors[a].name;
+    const double border_mm = kBorderShare * extent.depth_mm;
+    for (std::size_t k = 0; k < layout.markers.size(); ++k) {
+        const Nearest near = nearest_anchors(layout.markers[k], anchors, extent);
+        const double second = 0.5 * (1.0 - (near.second_mm - near.first_mm) / border_mm);
+        add(regions[near.first], k, 1.0 - std::max(0.0, second));
+        add(regions[near.second], k, second);
+    }
+    drop_empty(regions);
+    return regions;
+}
+
+std::vector<FaceRegion> whole_face(const MarkerLayout& layout) {
+    std::vector<FaceRegion> regions(1);
+    regions[0].name = "face";
+    for (std::size_t k = 0; k < layout.markers.size(); ++k) add(regions[0], k, 1.0);
+    return regions;
+}
+
+std::vector<double> shape_shares(std::span<const FaceRegion> regions, std::span<const float> basis_mm,
+                                 std::size_t shape_count) {
+    std::vector<double> shares(regions.size() * shape_count, 0.0);
+    const auto normalise = [&](std::size_t i, double least) {
+        double sum = 0.0;
+        for (std::size_t r = 0; r < regions.size(); ++r) {
+            double& share = shares[r * shape_count + i];
+            if (share < least) share = 0.0;
+            sum += share;
+        }
+        for (std::size_t r = 0; r < regions.size() && sum > 0.0; ++r) shares[r * shape_count + i] /= sum;
+    };
+    for (std::size_t i = 0; i < shape_count; ++i) {
+        for (std::size_t r = 0; r < regions.size(); ++r) {
+            for (std::size_t a = 0; a < regions[r].markers.size(); ++a) {
+                for (std::size_t axis = 0; axis < 3; ++axis) {
+                    const auto b =
+                        static_cast<double>(basis_mm[(3U * regions[r].markers[a] + axis) * shape_count + i]);
+                    shares[r * shape_count + i] += regions[r].blend[a] * b * b;
+                }
+            }
+        }
+        normalise(i, 0.0);
+        normalise(i, kLeastShare);
+    }
+    return shares;
+}
+
+}  // namespace rig::host
