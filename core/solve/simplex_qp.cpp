@@ -14,17 +14,17 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kLeastShift_mm2 = 1e-8F;  // examples within 0.1 um of each other are equal
-// What must be left of an example's square beyond those in use, as a share of it: a quarter of the tilt. Less comes
-// from an inverse that is worn.
-constexpr float kLeastRest = 0.25F * kSimplexTilt;
-constexpr float kAccepted = 4.0F;     // tolerances: rounding leaves this much on ill-conditioned faces
-constexpr float kLostSum = 0.25F;     // coefficients whose sum is off by this came from no inverse
-constexpr int kRefinements = 4;       // each gains the inverse's own accuracy once more
-constexpr float kEnterShare = 0.25F;  // of the hardest pull
-constexpr float kSameValue = 1e-6F;   // objectives closer than this differ by rounding
-constexpr int kMostRebuilds = 3;      // of a worn inverse in one frame
-constexpr int kChangesBeforeRebuild = 256;  // each leaves its rounding in the inverse
+// What must be left of an example's square beyond those in use, as a share of it: float's inverse keeps two
+// digits then. With less it is the walk's.
+constexpr float kLeastRest = 1e-5F;
+constexpr float kAccepted = 4.0F;           // tolerances: rounding leaves this much on ill-conditioned faces
+constexpr float kLostSum = 0.25F;           // coefficients whose sum is off by this came from no inverse
+constexpr int kRefinements = 3;             // each gains the inverse's own accuracy once more
+constexpr float kEnterShare = 0.25F;        // of the hardest pull
+constexpr float kSameValue = 1e-6F;         // objectives closer than this differ by rounding
 constexpr int kPatience = 3;                // exchanges that may pass without a better objective
+constexpr int kMostExchanges = 24;          // in one frame; a cold start of 15 examples takes up to 12
+constexpr int kChangesBeforeRebuild = 256;  // each leaves its rounding in the inverse
 
 using Set = std::uint32_t;  // one bit an example
 static_assert(kMaxRegionShapes <= 32);
@@ -65,26 +65,21 @@ class FaceWalk {
     void adopt_gram();
     void start_cold();
     bool exchange();
-    bool sharpen_fully();
+    bool sharpen();
     [[nodiscard]] float objective_at_aim() const;
     void take_out(Set leaving);
     bool bring_in(Set entering);
-    bool restore();
-    bool step();
     bool aim_from(const float* point);
     void measure(const float* at);
     [[nodiscard]] Set wanted() const;
-    bool walk();
-    bool enter();
-    void keep_sum();
     float project(std::size_t i);
     bool add(std::size_t i);
     void remove(std::size_t i);
     void add_outer_to_inverse(float factor, const float* u);
-    bool rebuild();
-    bool rebuild_again();
+    void rebuild();
     void mark(std::size_t i, bool in_use);
     void certify();
+    void walk();
 
     const SimplexQpProblem& p_;
     const SimplexQpConfig& config_;
@@ -92,32 +87,23 @@ class FaceWalk {
     SimplexQpWorkspace& ws_;
     SimplexQpReport& report_;
     std::size_t n_;
-    float tilt_ = 0.0F;
     float enough_ = 0.0F;    // tolerance at the size of this frame's numbers
     float lambda_ = 0.0F;    // the pull that all examples in use share
     float residual_ = 0.0F;  // largest Jacobi move among them
     float aim_sum_ = 1.0F;
-    Set negative_ = 0;       // of the aim
-    Set skipped_ = 0;        // came in for nothing but rounding
-    int mended_ = 0;
-    bool rebuilding_ = false;
-    bool measured_ = false;  // pull, move and lambda belong to the coefficients
-    std::size_t entered_ = kWidth;  // last
-    std::size_t standstills_ = 0;
+    Set negative_ = 0;  // of the aim
 };
 
 template <std::size_t kWidth>
 void FaceWalk<kWidth>::run() {
     if (!adopt_rows()) return;
     if (!s_.warm) start_cold();
-    if (s_.changes_since_rebuild > kChangesBeforeRebuild && !rebuild()) start_cold();
-    if (!exchange()) {
-        while (report_.iterations < config_.iteration_cap) {
-            ++report_.iterations;
-            if (!step()) break;
-        }
+    if (!s_.has_inverse || s_.changes_since_rebuild > kChangesBeforeRebuild) rebuild();
+    if (s_.has_inverse && exchange()) {
+        certify();
+    } else {
+        walk();
     }
-    certify();
 }
 
 // Which rows count, and G^T V g. The usual frame has every row and is read in place. False: no row is seen,
@@ -145,7 +131,6 @@ bool FaceWalk<kWidth>::adopt_rows() {
     const float* target = whole ? p_.target.data() : ws_.weighted.data();
     combine_rows(p_.examples.data(), kWidth, target, p_.rows, kWidth, nullptr, ws_.linear.data());
     if (changed) adopt_gram();
-    tilt_ = kSimplexTilt * s_.shift;
     const float size = Row(ws_.linear.data()).magnitude().largest();
     enough_ = config_.tolerance * std::max(1.0F, size / s_.shift);
     return true;
@@ -175,13 +160,13 @@ void FaceWalk<kWidth>::adopt_gram() {
     for (std::size_t i = 0; i < n_; ++i) trace += gram_row(i)[i];
     // Any shift is right; this one has the size of the other eigenvalues.
     s_.shift = finite(trace) ? std::max(trace / static_cast<float>(n_), kLeastShift_mm2) : 1.0F;
-    tilt_ = kSimplexTilt * s_.shift;
     s_.inverse_diagonal.fill(0.0F);
     for (std::size_t i = 0; i < n_; ++i) s_.inverse_diagonal[i] = 1.0F / (gram_row(i)[i] + s_.shift);
     s_.version = p_.version;
     s_.count = static_cast<std::uint16_t>(n_);
     s_.rows = static_cast<std::uint16_t>(p_.rows);
-    if (s_.warm && !rebuild()) start_cold();
+    s_.has_inverse = false;
+    s_.walk.has_gram = false;
 }
 
 // At the nearest single example.
@@ -200,54 +185,51 @@ void FaceWalk<kWidth>::start_cold() {
     s_.coefficients[best] = 1.0F;
     s_.warm = true;
     s_.used = s_.settled = bit(best);
-    measured_ = false;
-    static_cast<void>(rebuild());  // one example is never dependent
+    s_.has_inverse = false;
 }
 
-// Yesterday's set, changed by several examples at once: all whose coefficient on its affine span is negative leave
-// together; where none is, all that pull hardest come in. It goes on as long as every such feasible point is better
-// than the one before, which cannot go round in circles; then the walk that changes one at a time takes over. The
-// coefficients are the best feasible point so far. True: optimal.
+// Yesterday's set, changed by several examples at once: all whose coefficient on its affine span is negative
+// leave together; where none is, all that pull hardest come in. It goes on as long as every such feasible
+// point is better than the one before, which cannot go round in circles. The coefficients are the best
+// feasible point so far. True: optimal.
 template <std::size_t kWidth>
 bool FaceWalk<kWidth>::exchange() {
+    const int cap = std::min<int>(config_.iteration_cap, kMostExchanges);
     float best = kInfinity;
     int patience = kPatience;
     measure(s_.coefficients.data());
     Row(s_.coefficients.data()).store(ws_.point.data());
-    while (report_.iterations < config_.iteration_cap && aim_from(ws_.point.data())) {
+    while (report_.iterations < cap && aim_from(ws_.point.data())) {
         ++report_.iterations;
         if (negative_ != 0) {
             take_out(negative_);
             continue;
         }
-        if (!sharpen_fully()) return restore();
+        if (!sharpen()) return false;
         const float objective = objective_at_aim();
-        if (!(objective <= best + kSameValue * std::fabs(objective))) return restore();
+        if (!(objective <= best + kSameValue * std::fabs(objective))) return false;
         if (!(objective < best) && --patience == 0) return false;
         best = std::min(best, objective);
         const Row point = (1.0F / aim_sum_) * Row(ws_.aim.data());
         point.store(ws_.point.data());
         point.store(s_.coefficients.data());
         s_.settled = s_.used;
-        measured_ = true;
         const Set entering = wanted();
-        if (entering == 0) return residual_ <= kAccepted * enough_;
-        if (!bring_in(entering)) return restore();
+        if (entering == 0) return true;
+        if (!bring_in(entering)) return false;
     }
-    return restore();
+    return false;
 }
 
-// Measures the aim and sharpens it until the inverse's error is gone. False when that made a coefficient negative.
+// Measures the aim and sharpens it until the inverse's error is gone. False when it stays.
 template <std::size_t kWidth>
-bool FaceWalk<kWidth>::sharpen_fully() {
+bool FaceWalk<kWidth>::sharpen() {
     measure(ws_.aim.data());
     for (int i = 0; i < kRefinements && residual_ > enough_; ++i) {
-        const float before = residual_;
         if (!aim_from(ws_.aim.data()) || negative_ != 0) return false;
         measure(ws_.aim.data());
-        if (!(residual_ < 0.5F * before)) break;
     }
-    return true;
+    return residual_ <= kAccepted * enough_;
 }
 
 template <std::size_t kWidth>
@@ -281,41 +263,9 @@ bool FaceWalk<kWidth>::bring_in(Set entering) {
     return true;
 }
 
-// Back to the best feasible point, with the examples that were in use there. Always false.
-template <std::size_t kWidth>
-bool FaceWalk<kWidth>::restore() {
-    measured_ = false;
-    for (Set leaving = s_.used & ~s_.settled; leaving != 0;) remove(take_first(leaving));
-    for (Set entering = s_.settled & ~s_.used; entering != 0;) {
-        if (add(take_first(entering))) continue;
-        s_.used = s_.settled;
-        if (!rebuild()) start_cold();
-        break;
-    }
-    return false;
-}
-
-// From the coefficients at hand to the minimum of their face, and on to the next. False: nothing is left to do.
-template <std::size_t kWidth>
-bool FaceWalk<kWidth>::step() {
-    measure(s_.coefficients.data());
-    if (!aim_from(s_.coefficients.data())) return rebuild_again();
-    if (!walk()) return true;
-    measure(s_.coefficients.data());
-    for (int i = 0; i < kRefinements && residual_ > enough_; ++i) {
-        const float before = residual_;
-        if (!aim_from(s_.coefficients.data())) return rebuild_again();
-        if (!walk()) return true;
-        measure(s_.coefficients.data());
-        if (!(residual_ < 0.5F * before)) break;
-    }
-    measured_ = true;
-    if (residual_ > kAccepted * enough_ && rebuild_again()) return true;
-    return enter();
-}
-
-// aim := the minimum on the affine span of the examples in use: the point + inverse (pull - lambda 1), lambda such
-// that it sums to 1. From a point near by, the inverse's own error hardly counts. False: the inverse is worn out.
+// aim := the minimum on the affine span of the examples in use: the point + inverse (pull - lambda 1), lambda
+// such that it sums to 1. From a point near by, the inverse's own error hardly counts. False: the inverse is
+// worn out.
 template <std::size_t kWidth>
 bool FaceWalk<kWidth>::aim_from(const float* point) {
     const Row sums(s_.inverse_sums.data());
@@ -332,7 +282,7 @@ bool FaceWalk<kWidth>::aim_from(const float* point) {
 template <std::size_t kWidth>
 void FaceWalk<kWidth>::measure(const float* at) {
     const Row point(at);
-    Row fitted = tilt_ * point;
+    Row fitted(0.0F);
     fitted.add_rows(gram(), at, n_);
     const Row pull = Row(ws_.linear.data()) - fitted;
     lambda_ = (point * pull).sum();
@@ -345,80 +295,24 @@ void FaceWalk<kWidth>::measure(const float* at) {
 // Not in use, and would come in by more than the tolerance. The inverse diagonal of padding lanes is zero.
 template <std::size_t kWidth>
 Set FaceWalk<kWidth>::wanted() const {
-    return Row(ws_.move.data()).above(enough_) & ~s_.used & ~skipped_;
+    return Row(ws_.move.data()).above(enough_) & ~s_.used;
 }
 
-// Towards the aim as far as the coefficients stay non-negative. True when it was reached; else the example
-// whose coefficient became zero is out of use.
-template <std::size_t kWidth>
-bool FaceWalk<kWidth>::walk() {
-    measured_ = false;
-    Set shrinking = negative_;
-    if (shrinking == 0) {
-        ((1.0F / aim_sum_) * Row(ws_.aim.data())).store(s_.coefficients.data());
-        standstills_ = 0;
-        return true;
-    }
-    float length = kInfinity;
-    std::size_t blocking = 0;
-    while (shrinking != 0) {
-        const std::size_t i = take_first(shrinking);
-        const float room = s_.coefficients[i] / (s_.coefficients[i] - ws_.aim[i]);
-        if (!(room < length)) continue;
-        length = room;
-        blocking = i;
-    }
-    const Row c(s_.coefficients.data());
-    (c + length * (Row(ws_.aim.data()) - c)).above_zero().store(s_.coefficients.data());
-    s_.coefficients[blocking] = 0.0F;
-    keep_sum();
-    standstills_ = length > 0.0F ? 0 : standstills_ + 1;
-    remove(blocking);
-    // It came in for nothing but rounding: the inverse's, or the pull's.
-    if (blocking == entered_ && length == 0.0F && !rebuild_again()) skipped_ |= bit(blocking);
-    return false;
-}
-
-template <std::size_t kWidth>
-void FaceWalk<kWidth>::keep_sum() {
-    const Row c(s_.coefficients.data());
-    ((1.0F / c.sum()) * c).store(s_.coefficients.data());
-}
-
-// The unused example that pulls hardest comes in; after as many standstills as there are examples the first
-// that pulls at all (Bland's rule), which cannot go round in circles.
-template <std::size_t kWidth>
-bool FaceWalk<kWidth>::enter() {
-    for (Set set = wanted(); set != 0; set = wanted()) {
-        std::size_t best = take_first(set);
-        while (set != 0 && standstills_ <= n_) {
-            const std::size_t i = take_first(set);
-            if (ws_.move[i] > ws_.move[best]) best = i;
-        }
-        entered_ = best;
-        if (add(best)) return true;
-        skipped_ |= bit(best);
-    }
-    return false;
-}
-
-// projection := inverse (Gram_i + shift 1 + tilt e_i); returns what the diagonal keeps beyond it.
+// projection := inverse (Gram_i + shift 1); returns what the diagonal keeps beyond it.
 template <std::size_t kWidth>
 float FaceWalk<kWidth>::project(std::size_t i) {
     const Row column = Row(gram_row(i)) + Row(s_.shift);
     column.store(ws_.column.data());
-    ws_.column[i] += tilt_;
     Row projection(0.0F);
     projection.add_rows(s_.inverse.data(), ws_.column.data(), n_);
     projection.store(ws_.projection.data());
-    return ws_.column[i] - (column * projection).sum();  // the projection is zero at i
+    return ws_.column[i] - (column * projection).sum();
 }
 
-// Bordering: inverse += u u^T / rest, u = projection - e_i. False when the inverse is too worn for it.
+// Bordering: inverse += u u^T / rest, u = projection - e_i. False when the example depends on those in use.
 template <std::size_t kWidth>
 bool FaceWalk<kWidth>::add(std::size_t i) {
-    float rest = project(i);
-    if (!(rest * s_.inverse_diagonal[i] > kLeastRest) && !rebuilding_ && rebuild_again()) rest = project(i);
+    const float rest = project(i);
     if (!(rest * s_.inverse_diagonal[i] > kLeastRest)) return false;
     ws_.projection[i] = -1.0F;
     const float scale = 1.0F / rest;
@@ -462,47 +356,52 @@ void FaceWalk<kWidth>::mark(std::size_t i, bool in_use) {
     s_.used_lane[i] = in_use ? 1.0F : 0.0F;
 }
 
-// The inverse from nothing, over the examples in use. False when they depend on each other.
+// The inverse from nothing, over the examples in use at the coefficients, unless they depend on each other.
 template <std::size_t kWidth>
-bool FaceWalk<kWidth>::rebuild() {
+void FaceWalk<kWidth>::rebuild() {
     ++report_.rebuilds;
-    rebuilding_ = true;
     std::fill_n(s_.inverse.begin(), n_ * kWidth, 0.0F);
     s_.inverse_sums.fill(0.0F);
     s_.used_lane.fill(0.0F);
-    Set wanted = s_.used;
     s_.used = 0;
-    bool whole = true;
-    while (wanted != 0 && whole) whole = add(take_first(wanted));
-    rebuilding_ = false;
+    s_.has_inverse = true;
+    for (Set missing = s_.settled; missing != 0 && s_.has_inverse;) s_.has_inverse = add(take_first(missing));
     s_.changes_since_rebuild = 0;
-    return whole;
-}
-
-// For an inverse that shows its wear, a few times a frame. False: that was done already.
-template <std::size_t kWidth>
-bool FaceWalk<kWidth>::rebuild_again() {
-    if (mended_ == kMostRebuilds) return false;
-    ++mended_;
-    if (!rebuild()) start_cold();
-    return true;
 }
 
 template <std::size_t kWidth>
 void FaceWalk<kWidth>::certify() {
-    measure(s_.coefficients.data());
     const Row c(s_.coefficients.data());
-    // Of the problem itself: without the tilt.
-    const Row pull = Row(ws_.pull.data()) + tilt_ * c;
-    lambda_ = (c * pull).sum();
-    const Row move = (pull - Row(lambda_)) * Row(s_.inverse_diagonal.data());
-    report_.kkt = (c - (c + move).above_zero()).magnitude().largest();
-    pull.store(ws_.pull.data());
+    const Row pull(ws_.pull.data());
+    report_.kkt = (c - (c + Row(ws_.move.data())).above_zero()).magnitude().largest();
     float highest = lambda_;
     for (std::size_t i = 0; i < n_; ++i) highest = std::max(highest, ws_.pull[i]);
     report_.gap = highest - lambda_;
     report_.objective = -0.5F * (c * (pull + Row(ws_.linear.data()))).sum();
-    report_.optimal = report_.kkt <= kAccepted * enough_ + kSimplexTilt;
+    report_.optimal = report_.kkt <= kAccepted * enough_;
+}
+
+// Goes on from the best feasible point in double, which is exact also where examples depend on each other.
+template <std::size_t kWidth>
+void FaceWalk<kWidth>::walk() {
+    SimplexWalkProblem problem;
+    problem.rows = p_.rows;
+    problem.count = n_;
+    problem.stride = kWidth;
+    problem.examples = p_.examples;
+    problem.target = p_.target;
+    if (!s_.all_rows) problem.row_weight = {s_.row_weight.data(), p_.rows};
+    const auto cap = static_cast<std::uint16_t>(config_.iteration_cap - report_.iterations);
+    const SimplexWalkReport walked = walk_simplex(problem, static_cast<double>(config_.tolerance), cap,
+                                                  s_.walk, ws_.walk, s_.settled, s_.coefficients);
+    report_.iterations = static_cast<std::uint16_t>(report_.iterations + walked.iterations);
+    report_.changes = static_cast<std::uint16_t>(report_.changes + walked.changes);
+    report_.walked = true;
+    report_.kkt = static_cast<float>(walked.kkt);
+    report_.gap = static_cast<float>(walked.gap);
+    report_.objective = static_cast<float>(walked.objective);
+    report_.optimal = walked.optimal;
+    s_.has_inverse = false;
 }
 
 template <std::size_t kWidth>

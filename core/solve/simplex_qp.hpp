@@ -10,11 +10,12 @@
 // and nothing else; without it the Gram matrix holds the squared positions, of which float keeps too little.
 // For the same reason G^T V G + shift 1 1^T has the same minimum for every shift.
 //
-// An exact active set: exchanges of several examples at once, and a primal walk where those do not end. What
-// is returned is feasible wherever it stops; the optimal value does not depend on the start, and neither do
-// the coefficients unless examples depend on each other. The explicit inverse over the examples in use is
-// kept from frame to frame, spread out over all n rows and columns (zero where an example is not in use): a
-// change of the working set is one rank-one update without any moving of rows.
+// An exact active set: exchanges of several examples at once, in float; where those do not end, or examples
+// depend on each other, the walk in double of simplex_walk.hpp. What is returned is feasible wherever it
+// stops; the optimal value does not depend on the start, and neither do the coefficients unless examples
+// depend on each other. The explicit inverse over the examples in use is kept from frame to frame, spread out
+// over all n rows and columns (zero where an example is not in use): a change of the working set is one
+// rank-one update without any moving of rows.
 #pragma once
 
 #include <array>
@@ -23,15 +24,11 @@
 
 #include "core/base/float_kernels.hpp"
 #include "core/limits.hpp"
+#include "core/solve/simplex_walk.hpp"
 
 namespace rig {
 
 inline constexpr std::size_t kSimplexStride = padded(kMaxRegionShapes);
-
-// Added to the diagonal of G^T V G, as a share of its mean: examples that depend on each other have one answer then,
-// the most even one, at an objective that is above the optimum by no more than half the tilt. It is the least that
-// float can tell from rounding.
-inline constexpr float kSimplexTilt = 4e-6F;
 
 // Measured coordinates beyond this (a thousand faces away) count as hidden, as those that are not finite do.
 inline constexpr float kMaxSimplexTarget = 1e6F;
@@ -63,6 +60,7 @@ struct SimplexQpState {
     std::uint16_t count = 0;
     std::uint16_t rows = 0;
     std::uint16_t changes_since_rebuild = 0;
+    bool has_inverse = false;
     float shift = 0.0F;
     std::uint32_t used = 0;                                            // one bit an example
     std::uint32_t settled = 0;                                         // those in use at the coefficients
@@ -73,17 +71,19 @@ struct SimplexQpState {
     alignas(64) std::array<float, kMaxRegionShapes * kSimplexStride> inverse{};  // [n x stride]
     alignas(64) std::array<float, kMaxRegionShapes * kSimplexStride> gram{};     // G^T V G, when V != I
     std::array<float, kMaxRows> row_weight{};                                    // of that V
+    SimplexWalkState walk;
 };
 
 struct SimplexQpWorkspace {
     alignas(64) std::array<float, kSimplexStride> linear{};  // G^T V g
     alignas(64) std::array<float, kSimplexStride> pull{};    // G^T V (g - G c), minus half the gradient
     alignas(64) std::array<float, kSimplexStride> move{};    // of a Jacobi step
-    alignas(64) std::array<float, kSimplexStride> point{};      // from which the next aim is taken
+    alignas(64) std::array<float, kSimplexStride> point{};   // from which the next aim is taken
     alignas(64) std::array<float, kSimplexStride> aim{};     // minimum of the face
     alignas(64) std::array<float, kSimplexStride> column{};  // of the update
     alignas(64) std::array<float, kSimplexStride> projection{};
     std::array<float, kMaxRows> weighted{};  // V g
+    SimplexWalkWorkspace walk;
 };
 
 struct SimplexQpReport {
@@ -95,6 +95,7 @@ struct SimplexQpReport {
     float kkt = 0.0F;
     float objective = 0.0F;  // 1/2 c^T G^T V G c - c^T G^T V g: half the problem's, less a constant
     float gap = 0.0F;        // the objective is above the optimum by no more than this, up to rounding
+    bool walked = false;     // finished by the walk in double
     bool optimal = false;    // false: stopped at the cap, or kkt stayed above the tolerance
 };
 

@@ -62,9 +62,8 @@ const Head* head() {
     static_cast<void>(0)
 
 RegionMotion mouth_motion(const Head& head, const std::vector<Take>& takes) {
-    const std::vector<FaceRegion> regions = feature_regions(head.layout);
-    EXPECT_EQ(regions.at(1).name, "mouth");
-    return region_motion(regions[1], head.model.neutral_mm, head.model.basis_mm, takes, kImageAxes);
+    return region_motion(lip_region(head.layout), head.model.neutral_mm, head.model.basis_mm, takes,
+                         kImageAxes);
 }
 
 struct Curve {

@@ -53,6 +53,7 @@ Result<Inputs, FileError> load_inputs(const KeyShapesCommand& command) {
     if (!layout) return failure(layout.error());
     inputs.model = marker_model(inputs.rig, *layout);
     inputs.regions = feature_regions(*layout);
+    inputs.regions.push_back(lip_region(*layout));
     inputs.regions.push_back(whole_face(*layout)[0]);
     for (const std::string& path : command.takes) {
         auto take = load_take(path, inputs.rig);
@@ -202,7 +203,7 @@ void add_keyshapes_verb(CLI::App& app, int& exit_code) {
         ->capture_default_str()
         ->check(CLI::Range(std::size_t{1}, kMaxRegionShapes))
         ->type_name("K");
-    verb->add_option("--region", command->region, "eyes, mouth, pupils or face")
+    verb->add_option("--region", command->region, "eyes, mouth, pupils, lips or face")
         ->capture_default_str()
         ->type_name("NAME");
     verb->add_option("--axes", command->axes, "xyz, or xy as one camera in front sees it")

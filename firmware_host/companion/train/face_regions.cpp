@@ -71,31 +71,15 @@ void drop_empty(std::vector<FaceRegion>& regions) {
     std::erase_if(regions, [](const FaceRegion& region) { return region.markers.empty(); });
 }
 
-struct Nearest {
-    std::size_t first = 0;
-    std::size_t second = 0;
-    double first_mm = 0.0;
-    double second_mm = 0.0;
-};
-
-Nearest nearest_anchors(const LayoutMarker& marker, const std::vector<Anchor>& anchors,
-                        const Extent& extent) {
-    Nearest near{0, 0, HUGE_VAL, HUGE_VAL};
-    for (std::size_t a = 0; a < anchors.size(); ++a) {
-        const double x = static_cast<double>(marker.neutral_mm[0]) - anchors[a].across * extent.half_width_mm;
-        const double y = static_cast<double>(marker.neutral_mm[1]) - anchors[a].up * extent.depth_mm;
-        const double gap_mm = std::sqrt(x * x + y * y);
-        if (gap_mm < near.first_mm) {
-            near.second = near.first;
-            near.second_mm = near.first_mm;
-            near.first = a;
-            near.first_mm = gap_mm;
-        } else if (gap_mm < near.second_mm) {
-            near.second = a;
-            near.second_mm = gap_mm;
-        }
+std::vector<double> distances_mm(const LayoutMarker& marker, const std::vector<Anchor>& anchors,
+                                 const Extent& extent) {
+    std::vector<double> out;
+    for (const Anchor& anchor : anchors) {
+        const double x = static_cast<double>(marker.neutral_mm[0]) - anchor.across * extent.half_width_mm;
+        const double y = static_cast<double>(marker.neutral_mm[1]) - anchor.up * extent.depth_mm;
+        out.push_back(std::sqrt(x * x + y * y));
     }
-    return near;
+    return out;
 }
 
 // Takes out the anchor that owns the fewest markers, while one owns too few.
@@ -103,8 +87,10 @@ std::vector<Anchor> anchors_with_markers(const MarkerLayout& layout, const Exten
     std::vector<Anchor> anchors(kAnchors.begin(), kAnchors.end());
     while (anchors.size() > 1) {
         std::vector<std::size_t> owned(anchors.size(), 0);
-        for (const LayoutMarker& marker : layout.markers)
-            ++owned[nearest_anchors(marker, anchors, extent).first];
+        for (const LayoutMarker& marker : layout.markers) {
+            const std::vector<double> gap_mm = distances_mm(marker, anchors, extent);
+            ++owned[static_cast<std::size_t>(std::ranges::min_element(gap_mm) - gap_mm.begin())];
+        }
         const auto fewest = std::ranges::min_element(owned);
         if (*fewest >= kLeastOwned) break;
         anchors.erase(anchors.begin() + (fewest - owned.begin()));
@@ -142,13 +128,30 @@ std::vector<FaceRegion> surface_regions(const MarkerLayout& layout) {
     for (std::size_t a = 0; a < anchors.size(); ++a) regions[a].name = anchors[a].name;
     const double border_mm = kBorderShare * extent.depth_mm;
     for (std::size_t k = 0; k < layout.markers.size(); ++k) {
-        const Nearest near = nearest_anchors(layout.markers[k], anchors, extent);
-        const double second = 0.5 * (1.0 - (near.second_mm - near.first_mm) / border_mm);
-        add(regions[near.first], k, 1.0 - std::max(0.0, second));
-        add(regions[near.second], k, second);
+        std::vector<double> blend = distances_mm(layout.markers[k], anchors, extent);
+        const double nearest_mm = *std::ranges::min_element(blend);
+        double sum = 0.0;
+        for (double& b : blend) {
+            b = std::max(0.0, 1.0 - (b - nearest_mm) / border_mm);
+            sum += b;
+        }
+        for (std::size_t a = 0; a < anchors.size(); ++a) add(regions[a], k, blend[a] / sum);
     }
     drop_empty(regions);
     return regions;
+}
+
+FaceRegion lip_region(const MarkerLayout& layout) {
+    std::vector<double> share(layout.markers.size(), 0.0);
+    for (const FaceRegion& region : surface_regions(layout)) {
+        if (!region.name.ends_with("lip") && !region.name.ends_with("corner")) continue;
+        for (std::size_t a = 0; a < region.markers.size(); ++a) share[region.markers[a]] += region.blend[a];
+    }
+    FaceRegion lips{"lips", {}, {}};
+    for (std::size_t k = 0; k < share.size(); ++k) {
+        if (share[k] > 0.5) add(lips, k, 1.0);
+    }
+    return lips;
 }
 
 std::vector<FaceRegion> whole_face(const MarkerLayout& layout) {

@@ -25,9 +25,13 @@ struct FaceRegion {
 [[nodiscard]] std::vector<FaceRegion> feature_regions(const MarkerLayout& layout);
 
 // Up to 14 small regions [Zhang06 section 5.3]: forehead, glabella, eyes, nose, cheeks, corners of the mouth,
-// lips, chin, jaws. A marker near the border of two belongs to both. Regions that would own fewer than three
-// markers are shared out among the others.
+// lips, chin, jaws. A marker near a border belongs to all regions that meet there. Regions that would own
+// fewer than three markers are shared out among the others.
 [[nodiscard]] std::vector<FaceRegion> surface_regions(const MarkerLayout& layout);
+
+// The markers around the lips: those that belong to the lips and their corners among the surface regions more
+// than to others. What [Chuang02 Fig. 6] measures on; the mouth of feature_regions() reaches up to the nose.
+[[nodiscard]] FaceRegion lip_region(const MarkerLayout& layout);
 
 // One region with every marker.
 [[nodiscard]] std::vector<FaceRegion> whole_face(const MarkerLayout& layout);

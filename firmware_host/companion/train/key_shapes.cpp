@@ -67,7 +67,13 @@ std::vector<Index> widest(const MatrixXd& components, std::size_t count) {
 }
 
 KeyShapes cluster_means(const RegionMotion& motion, const MatrixXd& components, std::size_t count) {
-    const FrameClusters clusters = cluster_frames(components, count);
+    // From frames at even times: the source names no start, and one of maximum spread would be the other
+    // method.
+    std::vector<Index> starts;
+    const auto frames = static_cast<std::size_t>(components.rows());
+    for (std::size_t c = 0; c < std::min(count, frames); ++c)
+        starts.push_back(static_cast<Index>((2 * c + 1) * frames / (2 * std::min(count, frames))));
+    const FrameClusters clusters = cluster_frames(components, starts);
     const Index k = clusters.centres.rows();
     KeyShapes out;
     out.positions_mm = MatrixXd::Zero(k, motion.positions_mm.cols());
@@ -79,14 +85,19 @@ KeyShapes cluster_means(const RegionMotion& motion, const MatrixXd& components, 
         out.weights.row(owner) += motion.weights.row(f);
         members[owner] += 1.0;
     }
+    Index kept = 0;
     for (Index c = 0; c < k; ++c) {
-        const double scale = 1.0 / std::max(1.0, members[c]);
-        out.positions_mm.row(c) *= scale;
-        out.weights.row(c) *= scale;
+        if (members[c] == 0.0) continue;
+        const double scale = 1.0 / members[c];
+        out.positions_mm.row(kept) = out.positions_mm.row(c).eval() * scale;
+        out.weights.row(kept) = out.weights.row(c).eval() * scale;
+        ++kept;
         Index nearest = 0;
         (components.rowwise() - clusters.centres.row(c)).rowwise().squaredNorm().minCoeff(&nearest);
         out.frames.push_back(nearest);
     }
+    out.positions_mm.conservativeResize(kept, Eigen::NoChange);
+    out.weights.conservativeResize(kept, Eigen::NoChange);
     return out;
 }
 

@@ -12,13 +12,13 @@ struct FrameClusters {
     std::vector<Eigen::Index> owner;  // of every row of the points
 };
 
-// k-means (Lloyd) from a start of maximum spread: the row farthest from the mean, then always the row
-// farthest from those already taken. Deterministic; fewer than `count` clusters when rows repeat, at least
-// one.
-[[nodiscard]] FrameClusters cluster_frames(const Eigen::MatrixXd& points, std::size_t count);
+// k-means (Lloyd) from centres at these rows of the points. Deterministic; at most 30 rounds.
+[[nodiscard]] FrameClusters cluster_frames(const Eigen::MatrixXd& points,
+                                           const std::vector<Eigen::Index>& starts);
 
 // points: one frame a row, in principal components (mm). The frames nearest to the centres of a k-means
-// clustering of every so many of them. Deterministic; rising indices, each once; fewer than `count` when
+// clustering (Lloyd) that starts from maximum spread: the frame farthest from the mean, then always the frame
+// farthest from those already taken. Deterministic; rising indices, each once; fewer than `count` when
 // clusters share a frame or points repeat. At least one for a take with frames.
 [[nodiscard]] std::vector<Eigen::Index> choose_reference_frames(const Eigen::MatrixXd& points,
                                                                 std::size_t count);

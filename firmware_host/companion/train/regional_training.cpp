@@ -2,13 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 
 #include "core/base/float_kernels.hpp"
 #include "core/limits.hpp"
-#include "firmware_host/companion/train/reference_frames.hpp"
 
 namespace rig::host {
 
@@ -19,7 +17,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::array<std::size_t, 3> kAllAxes{0, 1, 2};
-constexpr Index kExampleComponents = 12;  // of the face in which examples are told apart: 99 % of its motion
 
 // Absolute positions [R x k] of the region's markers at these weights.
 MatrixXd example_positions(const FaceRegion& region, std::span<const float> neutral_mm,
@@ -81,10 +78,7 @@ RegionModel TrainedRegion::view() const {
 }
 
 std::vector<Index> example_frames(const RegionMotion& face, std::size_t count) {
-    const MatrixXd centred = face.positions_mm.rowwise() - face.positions_mm.colwise().mean();
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(centred.transpose() * centred);
-    const MatrixXd axes = solver.eigenvectors().rightCols(std::min(kExampleComponents, centred.cols()));
-    return choose_reference_frames(centred * axes, count);
+    return choose_key_shapes(face, KeyShapeMethod::kSpread, count).frames;
 }
 
 TrainedRegion region_of_examples(const FaceRegion& region, RegionSolver solver,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/limits.hpp"
 #include "tests/support/pack_samples/tiny_rig.hpp"
 #include "tests/support/random.hpp"
 
