@@ -22,5 +22,6 @@ function(rig_fuzz_target name)
     set_target_properties(${name}_replay PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
     add_test(NAME ${name}_replay COMMAND ${name}_replay ${ARG_CORPUS} ${ARG_MUTATIONS}
              WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
-    set_tests_properties(${name}_replay PROPERTIES LABELS fuzz TIMEOUT 300)
+    set_tests_properties(${name}_replay PROPERTIES LABELS fuzz)
+rig_timeout(${name}_replay 300)
 endfunction()

@@ -12,3 +12,8 @@ find_program(FLATC flatc REQUIRED)
 if(RIG_BUILD_TESTS)
     find_package(GTest REQUIRED)
 endif()
+if(RIG_BUILD_BENCHES)
+    # To compare with, in tests/bench/solve: templates over BLAS. Its own CMake package would link X11 and more.
+    find_path(DLIB_INCLUDE_DIR dlib/optimization.h REQUIRED)
+    find_package(BLAS REQUIRED)
+endif()

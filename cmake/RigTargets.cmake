@@ -46,6 +46,14 @@ function(rig_program name)
     target_link_libraries(${name} PRIVATE ${ARG_DEPS})
 endfunction()
 
+# rig_timeout(test seconds)    sanitizers and coverage counters make a test many times slower, not wrong
+function(rig_timeout test seconds)
+    if(RIG_SANITIZE OR CMAKE_CXX_FLAGS_DEBUG MATCHES "coverage")
+        math(EXPR seconds "${seconds} * 8")
+    endif()
+    set_tests_properties(${test} PROPERTIES TIMEOUT ${seconds})
+endfunction()
+
 # rig_thin(target)    for code that runs once, reads a command line and calls others: compile time counts, speed does not
 function(rig_thin target)
     target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
@@ -63,8 +71,12 @@ function(rig_test name)
     target_compile_definitions(${name} PRIVATE EIGEN_DONT_VECTORIZE EIGEN_DONT_PARALLELIZE)
     target_precompile_headers(${name} REUSE_FROM tests_headers)
     add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+    if(name MATCHES "^(unit|property)_core_")
+        add_dependencies(core_tests ${name})  # what scripts/coverage builds and runs
+    endif()
     if(NOT ARG_TIMEOUT)
         set(ARG_TIMEOUT 300)
     endif()
-    set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+    set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}")
+    rig_timeout(${name} ${ARG_TIMEOUT})
 endfunction()

@@ -7,10 +7,11 @@
 
 namespace rig {
 
-inline constexpr std::size_t kMaxCameras = 4;    // a helmet carries one to four
-inline constexpr std::size_t kMaxMarkers = 128;  // the densest published layout has 102
-inline constexpr std::size_t kMinMarkers = 4;    // fewer do not fix a rigid motion
-inline constexpr std::size_t kMaxShapes = 256;   // artists' rigs reach 200 to 250
+inline constexpr std::size_t kMaxCameras = 4;     // a helmet carries one to four
+inline constexpr std::size_t kMaxMarkers = 128;   // the densest published layout has 102
+inline constexpr std::size_t kMinMarkers = 4;     // fewer do not fix a rigid motion
+inline constexpr std::size_t kMaxShapes = 256;    // artists' rigs reach 200 to 250
+inline constexpr std::size_t kMaxUnknowns = 288;  // of one quadratic problem: every shape, and head room
 inline constexpr std::size_t kMaxRows = 3 * kMaxMarkers;
 inline constexpr std::size_t kMaxObservations = 256;  // per camera and frame: every marker twice
 inline constexpr std::size_t kMaxPoints = 256;        // unlabelled 3D points of one frame: every marker twice
@@ -19,7 +20,9 @@ inline constexpr std::size_t kMaxRbfCentres = 256;    // reference frames of one
 inline constexpr std::size_t kMaxRbfDimensions = 32;  // principal components kept; the sources use 4 to 20
 inline constexpr std::size_t kMaxRegions = 16;        // solved on their own; the sources use 3 and 14
 inline constexpr std::size_t kMaxRegionShapes = 32;  // key shapes or examples of one; the sources use 8 to 15
-inline constexpr std::size_t kMaxImageWidth = 1920;  // px
+inline constexpr std::size_t kMaxWindowFrames = 61;  // of a smoothing filter: a second at 60 Hz
+inline constexpr std::size_t kMaxControlPairs = 128;  // of each kind an artist may tie: every shape once
+inline constexpr std::size_t kMaxImageWidth = 1920;   // px
 inline constexpr std::size_t kMaxImageHeight = 1200;  // px
 inline constexpr std::size_t kBlockPx = 4;  // side of the squares whose means make the local background
 inline constexpr std::size_t kMaxBlocks = (kMaxImageWidth / kBlockPx) * (kMaxImageHeight / kBlockPx);
@@ -50,6 +53,7 @@ static_assert(4 * kMaxRegions *
                   (kMaxRows * (kMaxRegionShapes + 3) + kMaxRegionShapes * kMaxShapes + kMaxShapes) <=
               kMaxPackBytes / 2);
 static_assert(kMaxModes <= kMaxShapes);
+static_assert(kMaxShapes <= kMaxUnknowns);
 static_assert(kMaxDotDiameterPx + 16 <= kBlobWindowPx);
 static_assert(kMaxCandidates >= kMaxObservations);
 static_assert(kMaxImageWidth % kBlockPx == 0 && kMaxImageHeight % kBlockPx == 0);

@@ -5,7 +5,7 @@ import os, stat, struct, sys, time, tty
 
 TYPES = dict(enumerate("hello request,hello,names request,names,time request,time reply,goodbye".split(","), 1))
 TYPES |= dict(enumerate("weights,markers,status,event".split(","), 0x10)) | {0x30: "ack", 0x31: "nak"}
-TYPES |= dict(enumerate("start streams,stop streams,status request,command".split(","), 0x20))
+TYPES |= dict(enumerate("start streams,stop streams,status request,command,control".split(","), 0x20))
 TEXT_AT = {2: 28, 4: 8, 0x13: 16}  # where the texts of a message begin
 
 def crc32c(data):

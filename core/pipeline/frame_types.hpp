@@ -8,6 +8,7 @@
 #include "core/base/face_state.hpp"
 #include "core/base/linalg.hpp"
 #include "core/detect/observation.hpp"
+#include "core/filter/smoothing.hpp"
 #include "core/image/view.hpp"
 
 namespace rig {
@@ -17,6 +18,7 @@ enum class LossPolicy : std::uint8_t { kHold = 0, kDecay = 1 };
 struct PipelineConfig {
     bool stabilise = true;  // false: input is already in the face frame
     bool filter = true;     // smoothing and recovery blends; a temporal prior in the pack stays on either way
+    FilterChoice smoothing;  // per shape, when `filter` is set
     LossPolicy loss_policy = LossPolicy::kHold;
     MarkerPolarity polarity = MarkerPolarity::kAuto;
     double rate_hz = 60.0;
@@ -62,6 +64,9 @@ struct FrameReport {
     double hull_distance = 0.0;    // RBF packs: distance to the nearest reference, in its widths
     bool optimal = false;          // false: the iteration cap ended the solve at a feasible point
     bool solved = false;           // this tick has a solve behind it, whatever the ladder makes of it
+    // smoothing: how far back the frame lies that the weights answer for; 0 when nothing was smoothed
+    std::uint16_t delay_frames = 0;
+    std::int64_t delay_us = 0;  // in true time; state.capture_us is earlier by it
     // identity
     std::array<std::uint16_t, kMaxCameras> observations{};  // detected per camera
     std::uint16_t markers_seen = 0;

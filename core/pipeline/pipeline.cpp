@@ -47,6 +47,7 @@ Result<void, PipelineError> Pipeline::configure(const SolvePack& pack, const Pip
         return failure(PipelineError::kPackLimits);
     }
     if (!(config.rate_hz >= 1.0 && config.rate_hz <= 1000.0)) return failure(PipelineError::kRate);
+    if (!is_valid(config.smoothing, pack.shape_count)) return failure(PipelineError::kFilter);
     config_ = config;
     pack_ = pack;
     build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, model_workspace_,
@@ -79,10 +80,8 @@ void Pipeline::configure_stages(const PipelineConfig& config) {
     tracker_config_.rate_hz = config.rate_hz;
     stabiliser_config_ = StabiliserConfig{};
     stabiliser_config_.enabled = config.stabilise;
-    smoothing_config_ = OneEuroConfig{};
-    smoothing_config_.rate_hz = config.rate_hz;
-    smoothing_config_.low = pack_.weight_low;
-    smoothing_config_.high = pack_.weight_high;
+    configure_smoothing(config.smoothing, config.rate_hz, pack_.weight_low, pack_.weight_high,
+                        smoothing_config_);
     recovery_config_ = RecoveryConfig{};
     recovery_config_.rate_hz = config.rate_hz;
     recovery_config_.low = pack_.weight_low;
@@ -92,11 +91,18 @@ void Pipeline::configure_stages(const PipelineConfig& config) {
     ladder_config_.rate_hz = config.rate_hz;
 }
 
+Result<void, ControlError> Pipeline::set_controls(const ControlSet& controls) {
+    if (!configured_) return failure(ControlError::kShape);
+    if (const auto checked = check_controls(controls, pack_.shape_count); !checked) return checked;
+    prepare_controls(pack_, controls, solver_config_.controls);
+    return {};
+}
+
 void Pipeline::reset_tracking() {
     reset_tracker(tracker_);
     reset_stabiliser(stabiliser_);
     reset_solver(solver_);
-    reset_one_euro(smoothing_);
+    reset_smoothing(smoothing_);
 }
 
 // After a loss nothing of before helps any more. A search for identities that is under way goes on.
@@ -105,7 +111,7 @@ void Pipeline::forget() {
     track_report_.tracking = false;
     reset_stabiliser(stabiliser_);
     reset_solver(solver_);
-    reset_one_euro(smoothing_);
+    reset_smoothing(smoothing_);
 }
 
 void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& report) {
@@ -228,6 +234,7 @@ void Pipeline::solve_named(std::int64_t capture_us, FrameReport& report) {
     infer_missing(model_, stabilised_, completed_);
     solve(solver_config_, stabilised_, completed_, capture_us, solver_, solver_workspace_, solved_,
           solver_report_);
+    control_output(solver_config_.controls, {solved_.weights.data(), pack_.shape_count});
     report.solved = solver_report_.solved;
     report.kkt = solver_report_.kkt;
     report.objective_mm2 = solver_report_.objective_mm2;
@@ -262,18 +269,21 @@ void Pipeline::finish(std::int64_t capture_us, bool usable, FaceState& state, Fr
     state.state = ladder_.state;
     if (configured_) {
         if (!usable && ladder_.state == TrackingState::kLost) forget();
-        put_out(capture_us, usable, state);
+        put_out(capture_us, usable, state, report);
     }
     raise_faults(usable, report, state);
 }
 
-void Pipeline::put_out(std::int64_t capture_us, bool usable, FaceState& state) {
+void Pipeline::put_out(std::int64_t capture_us, bool usable, FaceState& state, FrameReport& report) {
     const std::size_t n = pack_.shape_count;
     const bool up = ladder_.state >= TrackingState::kPartial;
     if (usable) {
-        OneEuroReport smoothing;
+        SmoothingReport smoothing;
         const std::span<const double> raw(solved_.weights.data(), n);
-        filter_one_euro(smoothing_config_, raw, capture_us, smoothing_, {smoothed_.data(), n}, smoothing);
+        smooth(smoothing_config_, raw, capture_us, smoothing_, {smoothed_.data(), n}, smoothing);
+        if (!config_.filter) smoothing = SmoothingReport{.answered_us = capture_us};
+        report.delay_frames = smoothing.delay_frames;
+        report.delay_us = smoothing.delay_us;
         const std::span<const double> wanted(config_.filter ? smoothed_.data() : solved_.weights.data(), n);
         RecoveryReport recovery;
         if (!config_.filter || (up && !was_live_)) {
@@ -288,7 +298,7 @@ void Pipeline::put_out(std::int64_t capture_us, bool usable, FaceState& state) {
         was_live_ = was_live_ || up;
         state.held = recovery.phase == RecoveryPhase::kHeld;
         sent_any_ = sent_any_ || !state.held;
-        if (!state.held) sent_us_ = capture_us;
+        if (!state.held) sent_us_ = smoothing.answered_us;
         if (sent_any_) state.capture_us = sent_us_;  // of the weights, which may be older than this frame
         last_usable_us_ = capture_us;
         lost_from_ = sent_;
@@ -296,8 +306,9 @@ void Pipeline::put_out(std::int64_t capture_us, bool usable, FaceState& state) {
     } else {
         hold(capture_us, state);
     }
+    const Controls& controls = solver_config_.controls;
     for (std::size_t i = 0; i < n; ++i) {
-        state.weights[i] = static_cast<float>(sent_[i]);
+        state.weights[i] = std::clamp(static_cast<float>(sent_[i]), controls.low[i], controls.high[i]);
         const bool known = ladder_.state >= TrackingState::kHold && was_live_;
         state.confidence[i] = known ? solved_.confidence[i] : 0.0F;
     }
@@ -310,7 +321,8 @@ void Pipeline::hold(std::int64_t capture_us, FaceState& state) {
     if (ladder_.state <= TrackingState::kHold) reset_recovery(recovery_);
     if (!ladder_.ever_usable || ladder_.state != TrackingState::kLost) return;
     if (config_.loss_policy != LossPolicy::kDecay) return;
-    const std::int64_t since_us = elapsed_us(last_usable_us_, capture_us) - ladder_config_.lost_after_us;
+    const std::int64_t since_us =
+        elapsed_us(ladder_config_.lost_after_us, elapsed_us(last_usable_us_, capture_us));
     const double left =
         1.0 - std::clamp(static_cast<double>(since_us) / static_cast<double>(kDecayUs), 0.0, 1.0);
     for (std::size_t i = 0; i < pack_.shape_count; ++i) {

@@ -7,8 +7,8 @@
 
 #include "core/base/result.hpp"
 #include "core/detect/detector.hpp"
-#include "core/filter/one_euro.hpp"
 #include "core/filter/recovery_blend.hpp"
+#include "core/filter/smoothing.hpp"
 #include "core/infer/inference.hpp"
 #include "core/pack/solve_pack.hpp"
 #include "core/pipeline/frame_types.hpp"
@@ -19,7 +19,8 @@
 
 namespace rig {
 
-enum class PipelineError : std::uint8_t { kPackLimits, kRate };
+// kFilter: a window, a kind of filter or the delay is outside its range.
+enum class PipelineError : std::uint8_t { kPackLimits, kRate, kFilter };
 
 // About 11 MB, all of it inside the object: a program places it before seal(), never on a stack. step() and
 // idle() never allocate. The pack's bytes outlive it. One thread uses a pipeline.
@@ -37,6 +38,11 @@ class Pipeline {
     void step(const PointFrame& frame, FaceState& state, FrameReport& report);
     // A tick for which no input arrived at all.
     void idle(std::int64_t now_us, FaceState& state, FrameReport& report);
+
+    // What an artist asks for, from the next step on; neutral after configure(). What is put out is inside
+    // the ranges that were set from then on, also while it is held, decays or rests. kShape before
+    // configure().
+    [[nodiscard]] Result<void, ControlError> set_controls(const ControlSet& controls);
 
     // Forgets identities, slip and the temporal prior; the next frames find them anew.
     void reset_tracking();
@@ -61,7 +67,7 @@ class Pipeline {
     void track_sightings(FrameReport& report);
     void solve_named(std::int64_t capture_us, FrameReport& report);
     void finish(std::int64_t capture_us, bool usable, FaceState& state, FrameReport& report);
-    void put_out(std::int64_t capture_us, bool usable, FaceState& state);
+    void put_out(std::int64_t capture_us, bool usable, FaceState& state, FrameReport& report);
     void hold(std::int64_t capture_us, FaceState& state);
     void raise_faults(bool usable, const FrameReport& report, FaceState& state) const;
     [[nodiscard]] bool is_partial(const FaceState& state) const;
@@ -98,8 +104,8 @@ class Pipeline {
     SolverOutput solved_;
     SolverReport solver_report_;
 
-    OneEuroConfig smoothing_config_;
-    OneEuroState smoothing_;
+    SmoothingConfig smoothing_config_;
+    SmoothingState smoothing_;
     RecoveryConfig recovery_config_;
     RecoveryState recovery_;
     LadderConfig ladder_config_;

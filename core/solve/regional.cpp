@@ -54,6 +54,7 @@ void run_simplex(const RegionModel& region, const RegionalTables& tables, std::s
     const SimplexQpReport qp = solve_simplex_qp(problem, {}, state.simplex, ws.simplex, ws.coefficients);
     report.kkt = static_cast<double>(qp.kkt);
     report.iterations = qp.iterations;
+    report.changes = qp.changes;
     report.rows_used = qp.rows_used;
     report.optimal = qp.optimal;
 }
@@ -87,8 +88,7 @@ void refresh_gram(const RegionModel& region, RegionState& state, const RegionalW
     state.has_gram = true;
 }
 
-void run_nnls(const RegionModel& region, RegionState& state, RegionalWorkspace& ws,
-              BoxQpWorkspace& box_workspace, RegionReport& report) {
+void run_nnls(const RegionModel& region, RegionState& state, RegionalWorkspace& ws, RegionReport& report) {
     const std::size_t rows = 3U * region.marker_count;
     const std::size_t n = region.example_count;
     const std::size_t stride = padded(n);
@@ -106,9 +106,10 @@ void run_nnls(const RegionModel& region, RegionState& state, RegionalWorkspace& 
     } else {
         refresh_gram(region, state, ws);
         const NnlsProblem problem{n, kMaxRegionShapes, state.gram, ws.linear};
-        const BoxQpReport qp = solve_nnls(problem, state.nnls, ws.nnls, box_workspace, ws.weights);
-        report.kkt = static_cast<double>(qp.kkt);
+        const BoxQpReport qp = solve_nnls(problem, state.nnls, ws.nnls, ws.weights);
+        report.kkt = qp.kkt;
         report.iterations = qp.iterations;
+        report.changes = qp.changes;
         report.optimal = qp.optimal;
     }
     ws.coefficients.fill(0.0F);
@@ -122,7 +123,8 @@ void measure_fit(const RegionModel& region, const RegionalWorkspace& ws, RegionR
     for (std::size_t r = 0; r < 3U * region.marker_count; ++r) {
         const float weight = ws.row_weight[r];
         if (!(weight > 0.0F)) continue;
-        const float fitted = dot(region.examples_mm.data() + r * stride, ws.coefficients.data(), stride);
+        const float fitted =
+            padded_dot(region.examples_mm.data() + r * stride, ws.coefficients.data(), stride);
         const auto left = static_cast<double>(ws.target_mm[r] - fitted);
         sum += static_cast<double>(weight) * left * left;
         weights += static_cast<double>(weight);
@@ -164,9 +166,17 @@ void build_regional_tables(const SolvePack& pack, RegionalTables& tables) {
     }
 }
 
+void reset_regions(RegionalState& state) {
+    for (RegionState& region : state.regions) {
+        region.simplex.warm = false;
+        region.nnls = NnlsState{};
+        region.has_gram = false;
+    }
+}
+
 void solve_regions(const SolvePack& pack, const RegionalTables& tables, const RegionalInput& input,
-                   RegionalState& state, RegionalWorkspace& workspace, BoxQpWorkspace& box_workspace,
-                   RegionalOutput& output, std::span<double> shape_weights) {
+                   RegionalState& state, RegionalWorkspace& workspace, RegionalOutput& output,
+                   std::span<double> shape_weights) {
     RIG_CHECK(input.positions_mm.size() == pack.marker_count && input.weights.size() == pack.marker_count);
     RIG_CHECK(input.confidence.size() >= pack.shape_count && shape_weights.size() >= pack.shape_count);
     std::fill_n(shape_weights.begin(), pack.shape_count, 0.0);
@@ -179,7 +189,7 @@ void solve_regions(const SolvePack& pack, const RegionalTables& tables, const Re
         if (region.solver == RegionSolver::kSimplex) {
             run_simplex(region, tables, r, state.regions[r], workspace, report);
         } else {
-            run_nnls(region, state.regions[r], workspace, box_workspace, report);
+            run_nnls(region, state.regions[r], workspace, report);
         }
         measure_fit(region, workspace, report);
         add_shapes(pack, region, workspace, input.confidence, report, shape_weights);

@@ -65,6 +65,7 @@ struct RegionReport {
     double objective_mm2 = 0.0;    // sum of v |p - origin - E c|^2
     float confidence = 0.0F;  // of the shapes it drives, by their blends: hiding a marker never raises it
     std::uint16_t iterations = 0;
+    std::uint16_t changes = 0;    // of the working set
     std::uint16_t rows_used = 0;  // 0: nothing of it was seen, and its last coefficients stay
     bool optimal = false;
 };
@@ -75,9 +76,12 @@ struct RegionalOutput {
     std::array<RegionReport, kMaxRegions> regions{};
 };
 
+// The next frame starts cold and remembers no coefficients.
+void reset_regions(RegionalState& state);
+
 // Solves every region of the pack. shape_weights [N]: finite, not clamped to the pack's ranges. Bounded work.
 void solve_regions(const SolvePack& pack, const RegionalTables& tables, const RegionalInput& input,
-                   RegionalState& state, RegionalWorkspace& workspace, BoxQpWorkspace& box_workspace,
-                   RegionalOutput& output, std::span<double> shape_weights);
+                   RegionalState& state, RegionalWorkspace& workspace, RegionalOutput& output,
+                   std::span<double> shape_weights);
 
 }  // namespace rig

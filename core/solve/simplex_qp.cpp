@@ -420,9 +420,13 @@ void build_simplex_gram(std::span<const float> examples, std::size_t rows, std::
     RIG_CHECK(count > 0 && count <= kMaxRegionShapes && examples.size() >= rows * stride);
     RIG_CHECK(gram.size() >= count * stride && (row_weight.empty() || row_weight.size() >= rows));
     std::fill_n(gram.begin(), count * stride, 0.0F);
+    alignas(64) std::array<float, kSimplexStride> scaled;
     for (std::size_t r = 0; r < rows; ++r) {
         const float weight = row_weight.empty() ? 1.0F : row_weight[r];
-        if (weight > 0.0F) add_outer(gram.data(), stride, count, weight, examples.data() + r * stride);
+        if (!(weight > 0.0F)) continue;
+        const float root = std::sqrt(weight);
+        for (std::size_t i = 0; i < stride; ++i) scaled[i] = root * examples[r * stride + i];
+        add_square(gram.data(), stride, count, scaled.data());
     }
 }
 

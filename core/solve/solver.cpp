@@ -11,8 +11,6 @@ namespace rig {
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 std::size_t fill_input(const SolverConfig& config, const StabiliserOutput& stabilised, SolverWorkspace& w) {
     const double s2 = static_cast<double>(config.pack.noise_mm) * static_cast<double>(config.pack.noise_mm);
     std::size_t seen = 0;
@@ -30,15 +28,17 @@ std::size_t fill_input(const SolverConfig& config, const StabiliserOutput& stabi
     return seen;
 }
 
-void fill_bounds(const SolverConfig& config, SolverWorkspace& w) {
-    for (std::size_t i = 0; i < config.pack.shape_count; ++i) {
-        w.low[i] = static_cast<double>(config.pack.weight_low[i]);
-        w.high[i] = static_cast<double>(config.pack.weight_high[i]);
-        if (config.pack.solver == SolverKind::kLeastSquares) {
+template <typename Real>
+void fill_bounds(const SolvePack& pack, QuadraticWorkspace<Real>& w) {
+    constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
+    for (std::size_t i = 0; i < pack.shape_count; ++i) {
+        w.low[i] = static_cast<Real>(pack.weight_low[i]);
+        w.high[i] = static_cast<Real>(pack.weight_high[i]);
+        if (pack.solver == SolverKind::kLeastSquares) {
             w.low[i] = -kInfinity;
             w.high[i] = kInfinity;
-        } else if (config.pack.solver == SolverKind::kNonNegative) {
-            w.low[i] = 0.0;
+        } else if (pack.solver == SolverKind::kNonNegative) {
+            w.low[i] = Real(0);
             w.high[i] = kInfinity;
         }
     }
@@ -51,38 +51,96 @@ double gamma_scale(const SolverConfig& config, const SolverState& state, std::in
     return 1.0 / std::max(1.0, gap_s * config.rate_hz);
 }
 
-constexpr double kSameInformation =
-    0.05;  // of the trace: a ray turns by less while a marker moves about its place
-
-// Confidence depends on what is seen and from where, not on where it is, so it is kept until that changes: a
-// marker comes or goes, or a camera does.
-void update_confidence(const SolverConfig& config, SolverState& state, SolverWorkspace& w) {
+// Confidence depends on what is seen and from where, not on where it is, so it is kept until that changes.
+template <typename Real>
+void update_confidence(const SolverConfig& config, const NormalState<Real>& normal, bool changed,
+                       SolverState& state, SolverWorkspace& w) {
+    if (state.has_confidence && !changed) return;
     const SolvePack& pack = config.pack;
-    bool same = state.has_confidence;
-    for (std::size_t k = 0; k < pack.marker_count && same; ++k) {
-        const Vec3 now = w.weights[k].diagonal();
-        const Vec3 change = now - state.seen_weight[k];
-        same = change.cwiseAbs().maxCoeff() <= kSameInformation * now.sum();
+    const std::size_t n = pack.shape_count;
+    const std::size_t stride = row_stride(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        const Real* row = normal.hessian.data() + i * stride;
+        for (std::size_t j = 0; j < i; ++j) w.gram[i * kMaxShapes + j] = static_cast<double>(row[j]);
+        w.gram_diagonal[i] = std::max(0.0, static_cast<double>(row[i] - normal.regularisation[i]));
     }
-    if (same) return;
-    for (std::size_t k = 0; k < pack.marker_count; ++k) state.seen_weight[k] = w.weights[k].diagonal();
-    const ConfidenceInput input{w.equations.hessian, w.equations.data_diagonal, pack.prior_sigma,
-                                static_cast<double>(pack.noise_mm)};
-    weight_confidence(input, w.confidence, state.confidence);
+    weight_confidence({w.gram, w.gram_diagonal, pack.prior_sigma, static_cast<double>(pack.noise_mm)},
+                      w.confidence, state.confidence);
     state.has_confidence = true;
 }
 
-void run_quadratic(const SolverConfig& config, SolverState& state, SolverWorkspace& w, SolverOutput& output,
-                   SolverReport& report) {
+template <typename Real>
+BoxQpProblem<Real> pack_problem(const SolverConfig& config, const NormalState<Real>& normal,
+                                QuadraticWorkspace<Real>& w) {
     const std::size_t n = config.pack.shape_count;
-    fill_bounds(config, w);
-    const BoxQpProblem problem{n, w.equations.hessian, w.equations.linear, w.low, w.high};
-    for (std::size_t i = 0; i < n; ++i) output.weights[i] = state.previous[i];
-    const BoxQpReport qp = solve_box_qp(problem, config.qp, state.qp, w.qp, {output.weights.data(), n});
+    fill_bounds(config.pack, w);
+    return {n,      row_stride(n), {normal.hessian.data(), n * row_stride(n)}, w.equations.linear, w.low,
+            w.high, normal.version};
+}
+
+void add_certificate(const BoxQpReport& qp, double constant_mm2, SolverReport& report) {
     report.optimal = qp.optimal;
     report.kkt = qp.kkt;
-    report.iterations = qp.iterations;
-    report.objective_mm2 = 2.0 * qp.objective + w.equations.constant_mm2;
+    report.iterations = static_cast<std::uint16_t>(report.iterations + qp.iterations);
+    report.changes = static_cast<std::uint16_t>(report.changes + qp.changes);
+    report.objective_mm2 = 2.0 * qp.objective + constant_mm2;
+}
+
+template <typename Real>
+void run_quadratic(const SolverConfig& config, const BoxQpProblem<Real>& problem, const SolverState& state,
+                   BoxQpState<Real>& qp, QuadraticWorkspace<Real>& w, SolverOutput& output,
+                   SolverReport& report) {
+    const std::size_t n = problem.size;
+    for (std::size_t i = 0; i < n; ++i) w.weights[i] = static_cast<Real>(state.previous[i]);
+    const BoxQpReport solved =
+        solve_box_qp(problem, sizeof(Real) == sizeof(float) ? config.qp : config.precise_qp, qp, w.qp,
+                     std::span<Real>(w.weights.data(), n));
+    for (std::size_t i = 0; i < n; ++i) output.weights[i] = static_cast<double>(w.weights[i]);
+    add_certificate(solved, w.equations.constant_mm2, report);
+}
+
+// H with the artist's terms; normal: null when the answer of a solver without a quadratic is the measurement.
+void follow_controls(const SolverConfig& config, const NormalState<double>* normal, double gamma_scale,
+                     ControlledState& c) {
+    const std::size_t n = config.pack.shape_count;
+    const std::size_t stride = row_stride(n);
+    const std::uint32_t normal_version = normal != nullptr ? normal->version : 0;
+    if (c.valid && c.normal_version == normal_version && c.controls_version == config.controls.version &&
+        c.gamma_scale == gamma_scale)
+        return;
+    const std::span<double> hessian(c.hessian.data(), n * stride);
+    if (normal != nullptr) {
+        std::copy_n(normal->hessian.begin(), n * stride, hessian.begin());
+    } else {
+        measurement_curvature(config.controls, hessian, stride);
+    }
+    add_control_curvature(config.controls, gamma_scale, hessian, stride);
+    c.valid = true;
+    ++c.version;
+    c.normal_version = normal_version;
+    c.controls_version = config.controls.version;
+    c.gamma_scale = gamma_scale;
+}
+
+// output.weights: the measurement when `normal` is null.
+void run_controlled(const SolverConfig& config, const NormalState<double>* normal, double gamma_scale,
+                    SolverState& state, QuadraticWorkspace<double>& w, SolverOutput& output,
+                    SolverReport& report) {
+    const std::size_t n = config.pack.shape_count;
+    ControlledState& c = state.controlled;
+    follow_controls(config, normal, gamma_scale, c);
+    NormalEquations<double>& e = w.equations;
+    if (normal == nullptr) measurement_pull(config.controls, output.weights, e.linear, e.constant_mm2);
+    add_control_pull(config.controls, gamma_scale, state.previous, e.linear, e.constant_mm2);
+    fill_bounds(config.pack, w);
+    narrow_bounds(config.controls, w.low, w.high);
+    const std::size_t stride = row_stride(n);
+    const BoxQpProblem<double> problem{n,      stride,   {c.hessian.data(), n * stride}, e.linear, w.low,
+                                       w.high, c.version};
+    run_quadratic(config, problem, state, c.qp, w, output, report);
+    if (cancel_pairs(config.controls, output.weights, w.low, w.high, c.cancel)) {
+        run_quadratic(config, problem, state, c.qp, w, output, report);
+    }
 }
 
 void run_rbf(const SolverConfig& config, const InferenceOutput& completed, SolverWorkspace& w,
@@ -104,16 +162,93 @@ void run_regional(const SolverConfig& config, SolverState& state, SolverWorkspac
     const SolvePack& pack = config.pack;
     const RegionalInput input{
         {w.positions_mm.data(), pack.marker_count}, {w.weights.data(), pack.marker_count}, output.confidence};
-    solve_regions(pack, config.regional, input, state.regional, w.regional, w.qp, output.regional,
-                  output.weights);
+    solve_regions(pack, config.regional, input, state.regional, w.regional, output.regional, output.weights);
     report.optimal = true;
     for (std::size_t r = 0; r < pack.region_count; ++r) {
         const RegionReport& region = output.regional.regions[r];
         report.optimal = report.optimal && region.optimal;
         report.kkt = std::max(report.kkt, region.kkt);
         report.iterations = static_cast<std::uint16_t>(report.iterations + region.iterations);
+        report.changes = static_cast<std::uint16_t>(report.changes + region.changes);
         report.objective_mm2 += region.objective_mm2;
     }
+}
+
+// Below this share of the mean diagonal of B^T B, ridge and pull leave float's inverse to wear out.
+constexpr double kFirmShare = 1e-4;
+
+void measure_firmness(const SolvePack& pack, SolverConfig& config) {
+    double sum = 0.0;
+    for (const float b : pack.basis_mm) sum += static_cast<double>(b) * static_cast<double>(b);
+    float least = pack.shape_count > 0 ? pack.temporal_gamma[0] : 0.0F;
+    for (const float gamma : pack.temporal_gamma) least = std::min(least, gamma);
+    const double mean = std::max(sum / static_cast<double>(pack.shape_count), 1e-12);
+    config.ridge_share = static_cast<double>(pack.ridge_mm2) / mean;
+    config.pull_share = static_cast<double>(least) / mean;
+}
+
+template <typename Real>
+void configure_tables(const SolvePack& pack, NormalTables<Real>& tables, SolverWorkspace& w) {
+    build_normal_tables(pack, tables);
+    const std::size_t stride = row_stride(pack.shape_count);
+    for (std::size_t i = 0; i < pack.shape_count; ++i) {
+        const Real* row = tables.full_gram.data() + i * stride;
+        for (std::size_t j = 0; j < i; ++j) w.gram[i * kMaxShapes + j] = static_cast<double>(row[j]);
+        w.gram_diagonal[i] = static_cast<double>(row[i]);
+    }
+}
+
+// Rest, before anything was seen: zero, as far as the ranges allow.
+void rest(const SolvePack& pack, SolverState& state) {
+    for (std::size_t i = 0; i < pack.shape_count; ++i) {
+        state.previous[i] = std::clamp(0.0, static_cast<double>(pack.weight_low[i]),
+                                       static_cast<double>(pack.weight_high[i]));
+    }
+}
+
+// In one precision: from the markers to output.weights.
+template <typename Real>
+void solve_in(const SolverConfig& config, const NormalTables<Real>& tables, const InferenceOutput& completed,
+              const NormalInput& input, bool enough, SolverState& state, QuadraticState<Real>& quadratic,
+              QuadraticWorkspace<Real>& own, SolverWorkspace& w, SolverOutput& output, SolverReport& report) {
+    const SolvePack& pack = config.pack;
+    const std::size_t n = pack.shape_count;
+    build_normal_equations(pack, tables, input, quadratic.normal, quadratic.qp, own.equations);
+    report.markers_used = static_cast<std::uint16_t>(own.equations.markers_used);
+    update_confidence(config, quadratic.normal, own.equations.changed, state, w);
+    output.confidence = state.confidence;
+    if (!enough) {
+        output.weights = state.previous;
+        return;
+    }
+    const bool measures = pack.solver == SolverKind::kRbf || is_regional(pack.solver);  // no quadratic in w
+    if (is_regional(pack.solver)) {
+        run_regional(config, state, w, output, report);
+    } else if (measures) {
+        run_rbf(config, completed, w, output, report);
+    }
+    bool controlled = false;
+    if constexpr (sizeof(Real) == sizeof(double)) {
+        controlled = config.controls.acts_on_problem;
+        if (controlled) {
+            run_controlled(config, measures ? nullptr : &quadratic.normal, input.gamma_scale, state, own,
+                           output, report);
+        }
+    }
+    if (!controlled && !measures) {
+        run_quadratic(config, pack_problem(config, quadratic.normal, own), state, quadratic.qp, own, output,
+                      report);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!is_finite(output.weights[i])) output.weights[i] = state.previous[i];
+        output.weights[i] = std::clamp(output.weights[i], static_cast<double>(pack.weight_low[i]),
+                                       static_cast<double>(pack.weight_high[i]));
+        own.weights[i] = static_cast<Real>(output.weights[i]);
+    }
+    for (std::size_t i = n; i < padded(n); ++i) own.weights[i] = Real(0);
+    report.residual_rms_mm =
+        residual_rms_mm(pack, tables, input, std::span<const Real>(own.weights.data(), padded(n)));
+    report.solved = true;
 }
 
 }  // namespace
@@ -122,18 +257,26 @@ void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& wo
                       SolverConfig& config) {
     config.pack = pack;
     config.rate_hz = rate_hz;
-    build_normal_tables(pack, config.tables);
+    measure_firmness(pack, config);
     build_regional_tables(pack, config.regional);
-    for (std::size_t i = 0; i < pack.shape_count; ++i) {
-        workspace.equations.data_diagonal[i] = config.tables.full_gram[i * kMaxShapes + i];
-    }
-    const ConfidenceInput everything{config.tables.full_gram, workspace.equations.data_diagonal,
-                                     pack.prior_sigma, static_cast<double>(pack.noise_mm)};
-    weight_confidence(everything, workspace.confidence, config.full_confidence);
+    configure_tables(pack, config.tables, workspace);
+    configure_tables(pack, config.precise_tables, workspace);
+    weight_confidence(
+        {workspace.gram, workspace.gram_diagonal, pack.prior_sigma, static_cast<double>(pack.noise_mm)},
+        workspace.confidence, config.full_confidence);
+    prepare_controls(pack, ControlSet{}, config.controls);
 }
 
 void reset_solver(SolverState& state) {
-    state = SolverState{};
+    state.quadratic.normal.valid = false;
+    state.quadratic.qp.warm = false;
+    state.precise.normal.valid = false;
+    state.precise.qp.warm = false;
+    state.controlled.qp.warm = false;
+    reset_regions(state.regional);
+    state.has_previous = false;
+    state.has_confidence = false;
+    state.confidence = {};
 }
 
 void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const InferenceOutput& completed,
@@ -141,41 +284,25 @@ void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const
            SolverReport& report) {
     report = SolverReport{};
     const SolvePack& pack = config.pack;
-    const std::size_t n = pack.shape_count;
-    if (!state.has_previous) {
-        for (std::size_t i = 0; i < n; ++i) {
-            state.previous[i] = std::clamp(0.0, static_cast<double>(pack.weight_low[i]),
-                                           static_cast<double>(pack.weight_high[i]));
-        }
-    }
-    const std::size_t seen = fill_input(config, stabilised, w);
+    if (!state.has_previous) rest(pack, state);
+    const bool enough = fill_input(config, stabilised, w) >= kMinMarkers;
     NormalInput input;
     input.positions_mm = {w.positions_mm.data(), pack.marker_count};
     input.weights = {w.weights.data(), pack.marker_count};
-    input.previous = {state.previous.data(), n};
+    input.previous = {state.previous.data(), pack.shape_count};
     input.gamma_scale = gamma_scale(config, state, capture_us);
-    build_normal_equations(pack, config.tables, input, w.equations);
-    report.markers_used = static_cast<std::uint16_t>(w.equations.markers_used);
-    update_confidence(config, state, w);
-    output.confidence = state.confidence;
-    if (seen < kMinMarkers) {
-        output.weights = state.previous;
-        return;
-    }
-    if (pack.solver == SolverKind::kRbf) {
-        run_rbf(config, completed, w, output, report);
-    } else if (is_regional(pack.solver)) {
-        run_regional(config, state, w, output, report);
+    const bool firm = config.ridge_share + input.gamma_scale * config.pull_share >= kFirmShare;
+    const bool single = firm && !config.controls.acts_on_problem;
+    if (single != state.in_single) state.has_confidence = false;
+    state.in_single = single;
+    if (single) {
+        solve_in(config, config.tables, completed, input, enough, state, state.quadratic, w.quadratic, w,
+                 output, report);
     } else {
-        run_quadratic(config, state, w, output, report);
+        solve_in(config, config.precise_tables, completed, input, enough, state, state.precise, w.precise, w,
+                 output, report);
     }
-    for (std::size_t i = 0; i < n; ++i) {
-        if (!is_finite(output.weights[i])) output.weights[i] = state.previous[i];
-        output.weights[i] = std::clamp(output.weights[i], static_cast<double>(pack.weight_low[i]),
-                                       static_cast<double>(pack.weight_high[i]));
-    }
-    report.residual_rms_mm = residual_rms_mm(pack, config.tables, input, {output.weights.data(), n});
-    report.solved = true;
+    if (!report.solved) return;
     state.previous = output.weights;
     state.previous_us = capture_us;
     state.has_previous = true;

@@ -11,6 +11,7 @@
 #include "core/pack/solve_pack.hpp"
 #include "core/solve/box_qp.hpp"
 #include "core/solve/confidence.hpp"
+#include "core/solve/controls.hpp"
 #include "core/solve/normal_equations.hpp"
 #include "core/solve/rbf.hpp"
 #include "core/solve/regional.hpp"
@@ -18,37 +19,73 @@
 
 namespace rig {
 
+// One precision's share of the stage. Float where ridge and pull keep the problem well posed, double where
+// they do not: least squares and NNLS as their sources have them, and the first frame after a loss.
+template <typename Real>
+struct QuadraticState {
+    NormalState<Real> normal;
+    BoxQpState<Real> qp;
+};
+template <typename Real>
+struct QuadraticWorkspace {
+    NormalEquations<Real> equations;
+    BoxQpWorkspace<Real> qp;
+    alignas(64) std::array<Real, kMaxShapeStride> weights{};
+    std::array<Real, kMaxShapes> low{};
+    std::array<Real, kMaxShapes> high{};
+};
+
+// The quadratic with the artist's terms on it, kept beside the pack's own while controls act: H changes when
+// they do or what is seen does. Always in double: a control may take every ridge away.
+struct ControlledState {
+    bool valid = false;
+    std::uint32_t version = 0;  // of H, and what it was made of:
+    std::uint32_t normal_version = 0;
+    std::uint32_t controls_version = 0;
+    double gamma_scale = 0.0;
+    alignas(64) std::array<double, kMaxShapes * kMaxShapeStride> hessian{};
+    BoxQpState<double> qp;
+    CancelState cancel;
+};
+
 struct SolverConfig {
-    SolvePack pack;       // spans; the bytes outlive the solver
-    NormalTables tables;  // built once
+    SolvePack pack;              // spans; the bytes outlive the solver
+    NormalTables<float> tables;  // built once
+    NormalTables<double> precise_tables;
+    RegionalTables regional;   // of a regional pack
+    double ridge_share = 0.0;  // ridge and least pull, relative to the mean diagonal of B^T B
+    double pull_share = 0.0;
     BoxQpConfig qp;
-    RegionalTables regional;  // of a regional pack
+    BoxQpConfig precise_qp{.tolerance = 1e-9};
+    Controls controls;  // neutral after configure_solver(); may be prepared anew between frames
     double rate_hz = 60.0;
     double forget_s = 0.25;  // the temporal prior starts anew after a gap of this length
     std::array<float, kMaxShapes> full_confidence{};  // of each weight when every marker is seen
 };
 
 struct SolverState {
-    BoxQpState qp;
+    QuadraticState<float> quadratic;
+    QuadraticState<double> precise;
     RegionalState regional;
+    bool in_single = false;  // precision of the last frame
+    ControlledState controlled;
     bool has_previous = false;
     std::int64_t previous_us = 0;
     std::array<double, kMaxShapes> previous{};
     // Confidence changes only with what is seen, so it is kept until that changes.
     bool has_confidence = false;
-    std::array<Vec3, kMaxMarkers> seen_weight{};  // diagonals of the V behind it; zero: not seen
     std::array<float, kMaxShapes> confidence{};
 };
 
 struct SolverWorkspace {
-    NormalEquations equations;
-    BoxQpWorkspace qp;
+    QuadraticWorkspace<float> quadratic;
+    QuadraticWorkspace<double> precise;
     RbfWorkspace rbf;
     RegionalWorkspace regional;
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> weights{};
-    std::array<double, kMaxShapes> low{};
-    std::array<double, kMaxShapes> high{};
+    std::array<double, kMaxShapes * kMaxShapes> gram{};  // B^T V B for the confidence
+    std::array<double, kMaxShapes> gram_diagonal{};
     ConfidenceWorkspace confidence;
     std::array<float, kMaxRows> flat_mm{};
 };
@@ -62,10 +99,10 @@ struct SolverOutput {
 struct SolverReport {
     bool solved = false;  // false: nothing was seen; weights are the previous ones, or the rest pose
     bool optimal = false;
-    double kkt = 0.0;  // of the pack's problem at the answer, before any clamping of least squares
-    double objective_mm2 =
-        0.0;  // regional packs: the sum over regions, as iterations are; kkt is their worst
+    double kkt = 0.0;            // of the pack's problem at the answer, before any clamping of least squares
+    double objective_mm2 = 0.0;  // regional packs: the sum over regions, as iterations; kkt is their worst
     std::uint16_t iterations = 0;
+    std::uint16_t changes = 0;  // of the working set
     std::uint16_t markers_used = 0;
     double residual_rms_mm = 0.0;
     double hull_distance = 0.0;  // RBF: distance to the nearest centre, in that centre's widths

@@ -46,6 +46,7 @@ enum class MessageType : std::uint8_t {
     kStopStreams = 0x21,
     kStatusRequest = 0x22,
     kCommand = 0x23,
+    kControl = 0x24,
     kAck = 0x30,
     kNak = 0x31,
 };

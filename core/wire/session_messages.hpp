@@ -26,6 +26,7 @@ enum class Role : std::uint8_t { kHost = 0, kBoard = 1 };
 inline constexpr std::uint32_t kCanStreamMarkers = 1U << 0;
 inline constexpr std::uint32_t kCanResetTracking = 1U << 1;
 inline constexpr std::uint32_t kIsSimulated = 1U << 2;
+inline constexpr std::uint32_t kCanControl = 1U << 3;
 
 // Both directions. A host leaves everything about a pack zero.
 struct Hello {

@@ -6,9 +6,7 @@
 #include <sstream>
 
 #include "core/limits.hpp"
-
-#define TOML_EXCEPTIONS 0
-#include <toml++/toml.h>
+#include "firmware_host/settings/filter_table.hpp"
 
 namespace rig {
 
@@ -54,8 +52,8 @@ std::string read_named(const toml::node_view<const toml::node>& list, const char
 }
 
 std::string read_table(const toml::table& table, Board& board) {
-    const auto key =
-        unknown_key(table, {"name", "rate_hz", "frozen_frames", "default_link", "camera", "line"});
+    const auto key = unknown_key(
+        table, {"name", "rate_hz", "frozen_frames", "default_link", "camera", "line", "smoothing"});
     if (!key.empty()) return fmt::format("there is no key '{}'", key);
     board.name = table["name"].value_or(std::string());
     if (board.name.empty() || board.name.size() > 24) return "'name' must have 1 to 24 bytes";
@@ -71,6 +69,12 @@ std::string read_table(const toml::table& table, Board& board) {
     if (fault.empty() && board.cameras.size() > kMaxCameras) {
         fault =
             fmt::format("there are {} cameras; at most {} are possible", board.cameras.size(), kMaxCameras);
+    }
+    if (fault.empty() && constant["smoothing"]) {
+        const toml::table* smoothing = constant["smoothing"].as_table();
+        fault = smoothing == nullptr ? "'smoothing' must be a table"
+                                     : read_filter_settings(*smoothing, board.smoothing);
+        if (!fault.empty()) fault = "[smoothing]: " + fault;
     }
     return fault;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/result.hpp"
+#include "firmware_host/settings/filter_settings.hpp"
 
 namespace rig {
 
@@ -24,6 +25,7 @@ struct Board {
     std::string name;
     double rate_hz = 60.0;
     int frozen_frames = 3;
+    FilterSettings smoothing;  // unless the command line says otherwise
     std::string default_link;  // as --link takes it; "" when there is none
     std::vector<BoardCamera> cameras;
     std::vector<BoardLine> lines;

@@ -73,6 +73,22 @@ std::string read_streams(const std::string& list, StartStreams& streams) {
     return streams.mask == 0 ? "names no stream" : "";
 }
 
+void add_filter_options(CLI::App& app, FilterSettings& smoothing) {
+    app.add_option_function<std::string>(
+           "--filter", [&smoothing](const std::string& word) { smoothing.kind = filter_kind(word); },
+           "Smoothing: none (as --no-filter), one-euro or savitzky-golay; the board's by default")
+        ->check(CLI::IsMember({"none", "one-euro", "savitzky-golay"}).description(""))
+        ->type_name("KIND")
+        ->excludes("--no-filter");
+    app.add_option("--window", smoothing.window_frames, "savitzky-golay: frames of a fit, 3 to 61 (15)")
+        ->check(CLI::Range(3, static_cast<int>(kMaxWindowFrames)).description(""))
+        ->type_name("FRAMES");
+    app.add_option("--delay", smoothing.delay_frames,
+                   "savitzky-golay: how far back the weights lie, below the window (half of it)")
+        ->check(CLI::Range(0, static_cast<int>(kMaxWindowFrames) - 1).description(""))
+        ->type_name("FRAMES");
+}
+
 }  // namespace
 
 bool parse_command_line(int argc, char** argv, CommandLine& into, int& exit_code) {
@@ -115,6 +131,7 @@ bool parse_command_line(int argc, char** argv, CommandLine& into, int& exit_code
         ->check(CLI::Range(0.0, 3600.0).description(""))
         ->type_name("S");
     app.add_flag("--no-filter", no_filter, "No smoothing and no recovery blends");
+    add_filter_options(app, into.smoothing);
     app.add_flag("--no-stabilise", no_stabilise, "Take the markers as already aligned with the face");
     add_choice(app, "--loss-policy", policies, into.pipeline.loss_policy,
                "When the face is lost: hold, or decay to rest");

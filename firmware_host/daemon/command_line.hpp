@@ -6,6 +6,7 @@
 
 #include "core/pipeline/frame_types.hpp"
 #include "core/wire/session_messages.hpp"
+#include "firmware_host/settings/filter_settings.hpp"
 
 namespace rig {
 
@@ -33,6 +34,7 @@ struct CommandLine {
     ExecutorChoice executor = ExecutorChoice::kAuto;
     StartStreams streams{.mask = 0};
     PipelineConfig pipeline;
+    FilterSettings smoothing;  // what is said here goes before the board's
     double world_timeout_s = 30.0;
     double wait_host_s = 0.0;
     bool require_pack = false;

@@ -1,5 +1,7 @@
 #include "firmware_host/daemon/control.hpp"
 
+#include "core/wire/control_message.hpp"
+
 namespace rig {
 
 namespace {
@@ -70,6 +72,8 @@ void Control::handle(const FrameView& frame) {
             return handle_status(frame);
         case MessageType::kCommand:
             return handle_command(frame);
+        case MessageType::kControl:
+            return handle_control(frame);
         case MessageType::kAck:
         case MessageType::kNak:
             return;
@@ -153,6 +157,21 @@ void Control::handle_command(const FrameView& frame) {
     // Neutral is part of the pack: taking another one needs a pack, not a command.
     if (command->command != BoardCommand::kResetTracking) return refuse(frame, NakReason::kNotNow);
     solver_.request_reset();
+    acknowledge(frame);
+}
+
+// All edits of a message or none.
+void Control::handle_control(const FrameView& frame) {
+    const auto message = decode_control(frame.payload);
+    if (!message) return refuse(frame, nak_reason(message.error()));
+    if (identity_.shape_names.empty()) return refuse(frame, NakReason::kNotNow);
+    ControlSet edited = message->neutral_first ? ControlSet{} : controls_;
+    for (const ControlEdit& edit : message->edits) {
+        if (!edit_controls(edit, identity_.shape_names.size(), edited))
+            return refuse(frame, NakReason::kBadValue);
+    }
+    controls_ = edited;
+    solver_.request_controls(controls_);
     acknowledge(frame);
 }
 

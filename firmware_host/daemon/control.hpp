@@ -49,6 +49,7 @@ class Control {
     void handle_stop(const FrameView& frame);
     void handle_status(const FrameView& frame);
     void handle_command(const FrameView& frame);
+    void handle_control(const FrameView& frame);
     void acknowledge(const FrameView& frame);
     void refuse(const FrameView& frame, NakReason reason);
     void release_session();
@@ -64,6 +65,7 @@ class Control {
     bool owned_ = false;
     std::uint32_t owner_ = 0;  // session id of the host; 0 when it never said hello
     std::int64_t heard_us_ = 0;
+    ControlSet controls_;  // as they were last accepted
     TokenBucket messages_{500, 100};
     TokenBucket naks_{10, 10};
 };

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <system_error>
 
 #include "firmware_host/daemon/command_line.hpp"
 #include "firmware_host/daemon/heap_guard.hpp"
@@ -27,9 +28,7 @@ void print_summary(const rig::Wiring& wiring, const rig::Health& health) {
     }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
     rig::CommandLine command_line;
     int exit_code = rig::kExitOk;
     if (!rig::parse_command_line(argc, argv, command_line, exit_code)) return exit_code;
@@ -48,4 +47,15 @@ int main(int argc, char** argv) {
     if (end != rig::AppEnd::kWorldGone) return rig::kExitOk;
     print_error((*wiring)->world_fault() + "; start it again, then the daemon");
     return rig::kExitWorld;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        return run(argc, argv);
+    } catch (const std::system_error& error) {  // what fmt throws when it cannot print
+        print_error(fmt::format("standard output: {}", error.what()));
+        return rig::kExitOutput;
+    }
 }

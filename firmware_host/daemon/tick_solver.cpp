@@ -9,10 +9,15 @@ TickSolver::TickSolver(const TickSolverParts& parts) : parts_(parts) {
 void TickSolver::tick(const FrameSet& frames, FaultMap faults, TickOutput& output) {
     const bool reset = reset_wanted_.exchange(false, std::memory_order_relaxed);
     if (reset) parts_.pipeline.reset_tracking();
+    const ControlSet* const controls = wanted_controls_.take();
+    if (controls != nullptr) {
+        const auto set = parts_.pipeline.set_controls(*controls);
+        RIG_CHECK(set.has_value());
+    }
     const std::int64_t began_us = parts_.wall.now_us();
     parts_.pipeline.step(frames, state_, report_);
     const std::int64_t solve_us = parts_.wall.now_us() - began_us;
-    record(frames, reset);
+    record(frames, reset, controls);
     static_cast<void>(gate_.pass(state_));
     digest_.add(state_);
     state_.faults |= faults;
@@ -23,12 +28,18 @@ void TickSolver::tick(const FrameSet& frames, FaultMap faults, TickOutput& outpu
     output.health = health_;
 }
 
-void TickSolver::record(const FrameSet& frames, bool reset_before) {
+void TickSolver::request_controls(const ControlSet& controls) {
+    wanted_controls_.back() = controls;
+    static_cast<void>(wanted_controls_.publish());  // the newest set is the whole truth
+}
+
+void TickSolver::record(const FrameSet& frames, bool reset_before, const ControlSet* new_controls) {
     if (parts_.log == nullptr) return;
     ObservationTick tick;
     tick.number = state_.sequence;
     tick.capture_us = frames.capture_us;
     tick.reset_before = reset_before;
+    tick.new_controls = new_controls;
     tick.status = state_.cameras;
     for (std::size_t c = 0; c < kMaxCameras; ++c) tick.cameras[c] = parts_.pipeline.observations(c).span();
     parts_.log->append(tick);

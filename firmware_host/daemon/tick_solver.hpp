@@ -8,6 +8,7 @@
 #include "core/pipeline/pipeline.hpp"
 #include "core/wire/health.hpp"
 #include "core/wire/state_messages.hpp"
+#include "firmware_host/daemon/latest_box.hpp"
 #include "firmware_host/daemon/output_gate.hpp"
 #include "firmware_host/daemon/wear.hpp"
 #include "firmware_host/take_log/observation_log.hpp"
@@ -38,15 +39,18 @@ class TickSolver {
     void tick(const FrameSet& frames, FaultMap faults, TickOutput& output);
     // Any thread: before the next tick tracking begins anew.
     void request_reset() { reset_wanted_.store(true, std::memory_order_relaxed); }
+    // One thread, another one too: from the next tick on the solve goes by these. Checked against the pack.
+    void request_controls(const ControlSet& controls);
     [[nodiscard]] const StreamDigest& digest() const { return digest_; }
     [[nodiscard]] const Health& health() const { return health_; }
 
   private:
-    void record(const FrameSet& frames, bool reset_before);
+    void record(const FrameSet& frames, bool reset_before, const ControlSet* new_controls);
     void count(const FrameSet& frames, const FrameReport& report, std::int64_t solve_us);
 
     TickSolverParts parts_;
     std::atomic<bool> reset_wanted_{false};
+    LatestBox<ControlSet> wanted_controls_;
     OutputGate gate_;
     StreamDigest digest_;
     FaceState state_;

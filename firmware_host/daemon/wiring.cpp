@@ -131,6 +131,7 @@ struct Wiring::Rig {
     std::unique_ptr<Pipeline> pipeline;
     std::unique_ptr<ObservationLogWriter> log;
     std::unique_ptr<App> app;
+    PipelineConfig running;  // what the pipeline was configured with
     bool lockstep = true;
 
     [[nodiscard]] Result<void, WiringError> take_pack(const CommandLine& command_line);
@@ -239,9 +240,20 @@ GpioLine* Wiring::Rig::connect_line(const std::string& name) {
 
 Result<void, WiringError> Wiring::Rig::configure_pipeline(const CommandLine& command_line) {
     pipeline = std::make_unique<Pipeline>();
+    running = command_line.pipeline;
     if (pack == nullptr) return {};
     PipelineConfig config = command_line.pipeline;
     config.rate_hz = board.rate_hz;
+    const FilterSettings settings = merged(board.smoothing, command_line.smoothing);
+    const auto smoothing =
+        filter_choice(settings, std::span(pack->pack().shape_names).first(pack->pack().shape_count));
+    if (!smoothing) {
+        return refuse(kExitUsage,
+                      fmt::format("smoothing of board '{}' and --filter: {}", board.name, smoothing.error()));
+    }
+    config.smoothing = *smoothing;
+    config.filter = config.filter && !smooths_nothing(settings);
+    running = config;
     if (pipeline->configure(pack->pack(), config)) return {};
     return refuse(kExitInput,
                   fmt::format("{}: this rig cannot run at {} Hz with it", command_line.pack, board.rate_hz));
@@ -252,9 +264,10 @@ Result<void, WiringError> Wiring::Rig::start_log(const CommandLine& command_line
     ObservationLogHeader header;
     header.camera_count = world->hello().camera_count;
     header.rate_millihertz = world->hello().rate_millihertz;
-    header.filter = command_line.pipeline.filter;
-    header.stabilise = command_line.pipeline.stabilise;
-    header.loss_policy = static_cast<std::uint8_t>(command_line.pipeline.loss_policy);
+    header.filter = running.filter;
+    header.stabilise = running.stabilise;
+    header.smoothing = running.smoothing;
+    header.loss_policy = static_cast<std::uint8_t>(running.loss_policy);
     if (pack != nullptr) header.pack_hash = pack->manifest().manifest_hash;
     auto made = ObservationLogWriter::create(command_line.log_observations, header);
     if (!made)
@@ -268,7 +281,7 @@ BoardIdentity Wiring::Rig::identity(const CommandLine& command_line) const {
     Hello& hello = result.hello;
     hello.role = Role::kBoard;
     hello.session_id = std::random_device{}();
-    hello.capabilities = kCanStreamMarkers | kCanResetTracking | kIsSimulated;
+    hello.capabilities = kCanStreamMarkers | kCanResetTracking | kCanControl | kIsSimulated;
     hello.rate_mhz = static_cast<std::uint32_t>(board.rate_hz * 1000.0 + 0.5);
     hello.firmware = FixedText<24>(RIG_VERSION);
     hello.serial = FixedText<32>(command_line.name);

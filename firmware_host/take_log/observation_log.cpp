@@ -10,11 +10,24 @@ namespace rig {
 namespace {
 
 constexpr std::array<char, 4> kMagic{'R', 'G', 'O', '1'};
-constexpr std::uint16_t kVersion = 1;
+constexpr std::uint16_t kVersion = 2;
+constexpr std::size_t kFirstVersionHeaderBytes = 64;
 constexpr std::uint8_t kFilterBit = 1;
 constexpr std::uint8_t kStabiliseBit = 2;
 constexpr std::uint8_t kResetBit = 1;
+constexpr std::uint8_t kControlsBit = 2;
 constexpr std::uint8_t kLastStatus = static_cast<std::uint8_t>(CameraStatus::kExposure);
+
+// How one shape is smoothed, in a byte.
+std::uint8_t filter_code(const ShapeFilter& filter) {
+    return filter.kind == FilterKind::kSavitzkyGolay ? filter.window_frames
+                                                     : static_cast<std::uint8_t>(filter.kind);
+}
+
+ShapeFilter filter_of(std::uint8_t code) {
+    if (code <= static_cast<std::uint8_t>(FilterKind::kOneEuro)) return {static_cast<FilterKind>(code)};
+    return {FilterKind::kSavitzkyGolay, code};
+}
 
 void write_header(const ObservationLogHeader& header, MutableByteSpan into) {
     ByteWriter writer(into);
@@ -27,8 +40,28 @@ void write_header(const ObservationLogHeader& header, MutableByteSpan into) {
                                            (header.stabilise ? kStabiliseBit : 0) | header.loss_policy << 2));
     writer.write(std::array<std::uint8_t, 3>{});
     writer.write(header.pack_hash);
-    writer.write(std::array<std::uint8_t, 16>{});
+    writer.write(header.smoothing.delay_frames);
+    writer.write(std::array<std::uint8_t, 15>{});
+    for (const ShapeFilter& filter : header.smoothing.shapes) writer.write(filter_code(filter));
     RIG_CHECK(writer.ok() && writer.size() == kObservationLogHeaderBytes);
+}
+
+void write_controls(const ControlSet& set, ByteWriter& writer) {
+    for (const ShapeControls& s : set.shapes) {
+        writer.write(
+            std::array<float, 7>{s.sparsity, s.ridge, s.temporal, s.multiplier, s.offset, s.low, s.high});
+    }
+    writer.write(static_cast<std::uint16_t>(set.symmetry.size()));
+    for (const SymmetryPair& pair : set.symmetry) {
+        writer.write(pair.left);
+        writer.write(pair.right);
+        writer.write(pair.strength);
+    }
+    writer.write(static_cast<std::uint16_t>(set.cancel.size()));
+    for (const CancelPair& pair : set.cancel) {
+        writer.write(pair.first);
+        writer.write(pair.second);
+    }
 }
 
 std::size_t write_record(const ObservationTick& tick, std::uint8_t camera_count, MutableByteSpan into) {
@@ -36,7 +69,8 @@ std::size_t write_record(const ObservationTick& tick, std::uint8_t camera_count,
     writer.write(std::uint32_t{0});
     writer.write(tick.number);
     writer.write(tick.capture_us);
-    writer.write(static_cast<std::uint8_t>(tick.reset_before ? kResetBit : 0));
+    writer.write(static_cast<std::uint8_t>((tick.reset_before ? kResetBit : 0) |
+                                           (tick.new_controls != nullptr ? kControlsBit : 0)));
     for (std::size_t c = 0; c < kMaxCameras; ++c) {
         writer.write(c < camera_count ? tick.status[c] : CameraStatus::kUnused);
     }
@@ -48,6 +82,7 @@ std::size_t write_record(const ObservationTick& tick, std::uint8_t camera_count,
             writer.write(std::array<float, 5>{o.x_px, o.y_px, o.diameter_px, o.contrast, o.score});
         }
     }
+    if (tick.new_controls != nullptr) write_controls(*tick.new_controls, writer);
     RIG_CHECK(writer.ok());
     store(into, 0, static_cast<std::uint32_t>(writer.size() + sizeof(std::uint32_t)));
     writer.write(crc32c(writer.written()));
@@ -113,9 +148,9 @@ bool ObservationLogWriter::drain() {
 }
 
 Result<ObservationLogReader, ObservationLogError> ObservationLogReader::open(ByteSpan bytes) {
-    if (bytes.size() < kObservationLogHeaderBytes) return failure(ObservationLogError::kCut);
+    if (bytes.size() < kFirstVersionHeaderBytes) return failure(ObservationLogError::kCut);
     ObservationLogReader log(bytes);
-    ByteReader reader(bytes.first(kObservationLogHeaderBytes));
+    ByteReader reader(bytes.first(std::min(bytes.size(), kObservationLogHeaderBytes)));
     const auto magic = reader.read<std::array<char, 4>>();
     const auto version = reader.read<std::uint16_t>();
     log.header_.camera_count = reader.read<std::uint8_t>();
@@ -124,16 +159,25 @@ Result<ObservationLogReader, ObservationLogError> ObservationLogReader::open(Byt
     const auto flags = reader.read<std::uint8_t>();
     const auto padding = reader.read<std::array<std::uint8_t, 3>>();
     log.header_.pack_hash = reader.read<std::array<std::byte, 32>>();
-    const auto tail = reader.read<std::array<std::uint8_t, 16>>();
+    log.header_.smoothing.delay_frames = reader.read<std::uint8_t>();
+    const auto tail = reader.read<std::array<std::uint8_t, 15>>();
     log.header_.filter = (flags & kFilterBit) != 0;
     log.header_.stabilise = (flags & kStabiliseBit) != 0;
     log.header_.loss_policy = flags >> 2;
-    const bool known = magic == kMagic && version == kVersion && log.header_.camera_count >= 1 &&
-                       log.header_.camera_count <= kMaxCameras && log.header_.rate_millihertz > 0 &&
-                       log.header_.rate_millihertz <= 1'000'000 && log.header_.loss_policy <= 1 &&
-                       reserved == 0 && padding == std::array<std::uint8_t, 3>{} &&
-                       tail == std::array<std::uint8_t, 16>{};
+    const bool known = magic == kMagic && (version == 1 || version == kVersion) &&
+                       log.header_.camera_count >= 1 && log.header_.camera_count <= kMaxCameras &&
+                       log.header_.rate_millihertz > 0 && log.header_.rate_millihertz <= 1'000'000 &&
+                       log.header_.loss_policy <= 1 && reserved == 0 &&
+                       padding == std::array<std::uint8_t, 3>{} && tail == std::array<std::uint8_t, 15>{};
     if (!known) return failure(ObservationLogError::kFormat);
+    if (version == 1) {
+        log.position_ = kFirstVersionHeaderBytes;
+        if (log.header_.smoothing.delay_frames != 0) return failure(ObservationLogError::kFormat);
+        return log;
+    }
+    for (ShapeFilter& filter : log.header_.smoothing.shapes) filter = filter_of(reader.read<std::uint8_t>());
+    if (!reader.ok()) return failure(ObservationLogError::kCut);
+    if (!is_valid(log.header_.smoothing, kMaxShapes)) return failure(ObservationLogError::kFormat);
     return log;
 }
 
@@ -151,7 +195,31 @@ bool ObservationLogReader::read_observations(ByteReader& reader, ObservationTick
         }
         tick.cameras[c] = place;
     }
-    return reader.ok() && reader.remaining() == 0;
+    return reader.ok();
+}
+
+bool ObservationLogReader::read_controls(ByteReader& reader, ObservationTick& tick) {
+    for (ShapeControls& s : controls_.shapes) {
+        const auto numbers = reader.read<std::array<float, 7>>();
+        s = {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6]};
+    }
+    const auto symmetry_count = reader.read<std::uint16_t>();
+    if (symmetry_count > kMaxControlPairs) return false;
+    controls_.symmetry.resize(symmetry_count);
+    for (SymmetryPair& pair : controls_.symmetry) {
+        pair.left = reader.read<std::uint16_t>();
+        pair.right = reader.read<std::uint16_t>();
+        pair.strength = reader.read<float>();
+    }
+    const auto cancel_count = reader.read<std::uint16_t>();
+    if (cancel_count > kMaxControlPairs) return false;
+    controls_.cancel.resize(cancel_count);
+    for (CancelPair& pair : controls_.cancel) {
+        pair.first = reader.read<std::uint16_t>();
+        pair.second = reader.read<std::uint16_t>();
+    }
+    tick.new_controls = &controls_;
+    return reader.ok() && check_controls(controls_, kMaxShapes).has_value();
 }
 
 Result<ObservationTick, ObservationLogError> ObservationLogReader::next() {
@@ -174,12 +242,14 @@ Result<ObservationTick, ObservationLogError> ObservationLogReader::next() {
     const auto statuses = reader.read<std::array<std::uint8_t, kMaxCameras>>();
     const auto padding = reader.read<std::array<std::uint8_t, 3>>();
     tick.reset_before = (flags & kResetBit) != 0;
-    bool sound = flags <= kResetBit && padding == std::array<std::uint8_t, 3>{};
+    bool sound = flags <= (kResetBit | kControlsBit) && padding == std::array<std::uint8_t, 3>{};
     for (std::size_t c = 0; c < kMaxCameras; ++c) {
         sound = sound && statuses[c] <= kLastStatus;
         tick.status[c] = static_cast<CameraStatus>(sound ? statuses[c] : 0);
     }
-    if (!sound || !read_observations(reader, tick)) return failure(ObservationLogError::kDamaged);
+    sound = sound && read_observations(reader, tick);
+    if (sound && (flags & kControlsBit) != 0) sound = read_controls(reader, tick);
+    if (!sound || reader.remaining() != 0) return failure(ObservationLogError::kDamaged);
     position_ += length;
     return tick;
 }

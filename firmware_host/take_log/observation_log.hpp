@@ -1,22 +1,27 @@
 // A take as detection saw it, for solving it again on the desk: `headrigd --log-observations FILE`, `headrig
-// replay`. Little-endian. Header, 64 bytes:
+// replay`. Little-endian. Header, 320 bytes:
 //   0  4  "RGO1"
-//   4  2  u16 version, 1
+//   4  2  u16 version, 2. Version 1 is read too: its header ends at byte 64, and every shape had One Euro
 //   6  1  u8 camera count, 1..4
 //   7  1  u8 reserved, 0
 //   8  4  u32 ticks per 1000 s
 //  12  1  u8 bit 0: smoothing was on; bit 1: stabilising was on; bits 2-3: loss policy
 //  13  3  zero
 //  16 32  SHA-256 of the manifest of the pack
-//  48 16  zero
+//  48  1  u8 delay of the smoothing, frames
+//  49 15  zero
+//  64 256 per shape u8: how it was smoothed: 0 not, 1 One Euro, 3..61 Savitzky-Golay with that window
 // Then one record per tick:
 //   0  4  u32 length of the record in bytes, this field included
 //   4  4  u32 tick number, +1 each; a gap is a tick that the recorder had to drop
 //   8  8  i64 capture time of the tick, us
-//  16  1  u8 bit 0: tracking was reset just before this tick; others 0
+//  16  1  u8 bit 0: tracking was reset just before this tick; bit 1: so were controls set; others 0
 //  17  4  u8 status of each camera, 0 for cameras beyond the count
 //  21  3  zero
 //  24     per camera: u16 count, then count times 5 x f32 (x_px, y_px, diameter_px, contrast, score)
+//         with bit 1 then all controls (core/solve/controls.hpp): 256 times 7 x f32 (sparsity, ridge,
+//         temporal, multiplier, offset, low, high); u16 count of symmetry pairs, then count times 2 x u16 and
+//         f32; u16 count of cancel pairs, then count times 2 x u16
 // and at the end CRC-32C of the record before it, u32. A file that ends inside a record was cut; all before
 // it is good.
 #pragma once
@@ -35,20 +40,24 @@
 #include "core/base/face_state.hpp"
 #include "core/base/result.hpp"
 #include "core/detect/observation.hpp"
+#include "core/filter/smoothing.hpp"
+#include "core/solve/controls.hpp"
 
 namespace rig {
 
-inline constexpr std::size_t kObservationLogHeaderBytes = 64;
+inline constexpr std::size_t kObservationLogHeaderBytes = 64 + kMaxShapes;
 inline constexpr std::size_t kObservationRecordHeadBytes = 24;
 inline constexpr std::size_t kObservationBytes = 20;
 inline constexpr std::size_t kMaxObservationRecordBytes =
-    kObservationRecordHeadBytes + kMaxCameras * (2 + kMaxObservations * kObservationBytes) + 4;
+    kObservationRecordHeadBytes + kMaxCameras * (2 + kMaxObservations * kObservationBytes) + kMaxShapes * 28 +
+    2 + kMaxControlPairs * 8 + 2 + kMaxControlPairs * 4 + 4;
 
 struct ObservationLogHeader {
     std::uint8_t camera_count = 0;
     std::uint32_t rate_millihertz = 0;
     bool filter = true;
     bool stabilise = true;
+    FilterChoice smoothing;        // when `filter` is set
     std::uint8_t loss_policy = 0;  // of core/pipeline
     std::array<std::byte, 32> pack_hash{};
     bool operator==(const ObservationLogHeader&) const = default;
@@ -59,6 +68,7 @@ struct ObservationTick {
     std::uint32_t number = 0;
     std::int64_t capture_us = 0;
     bool reset_before = false;
+    const ControlSet* new_controls = nullptr;  // from this tick on; nullptr: as before
     std::array<CameraStatus, kMaxCameras> status{};
     std::array<std::span<const Observation>, kMaxCameras> cameras{};
 };
@@ -119,11 +129,13 @@ class ObservationLogReader {
     explicit ObservationLogReader(ByteSpan bytes)
         : bytes_(bytes), observations_(kMaxCameras * kMaxObservations) {}
     [[nodiscard]] bool read_observations(ByteReader& reader, ObservationTick& tick);
+    [[nodiscard]] bool read_controls(ByteReader& reader, ObservationTick& tick);
 
     ByteSpan bytes_;
     std::size_t position_ = kObservationLogHeaderBytes;
     ObservationLogHeader header_;
     std::vector<Observation> observations_;
+    ControlSet controls_;
 };
 
 }  // namespace rig

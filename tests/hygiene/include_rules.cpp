@@ -62,11 +62,14 @@ const std::vector<Room>& rooms() {
          with_ground({"firmware_host/companion", "hal/sim/world_protocol.hpp", kImageView})},
         // What both programs need; neither sees the other.
         {"firmware_host/pack_file", {"core", "hal"}},
+        {"firmware_host/settings", {"core"}},
         {"firmware_host/take_log", {"core"}},
         {"firmware_host/companion",
-         {"core", "hal", "firmware_host/companion", "firmware_host/pack_file", "firmware_host/take_log"}},
+         {"core", "hal", "firmware_host/companion", "firmware_host/pack_file", "firmware_host/settings",
+          "firmware_host/take_log"}},
         {"firmware_host/daemon",
-         {"core", "hal", "firmware_host/daemon", "firmware_host/pack_file", "firmware_host/take_log"}},
+         {"core", "hal", "firmware_host/daemon", "firmware_host/pack_file", "firmware_host/settings",
+          "firmware_host/take_log"}},
         {"tests", {"core", "hal", "firmware_host", "tests"}},
     };
     return kRooms;

@@ -175,7 +175,6 @@ double error_of_regions(const Head& head, const std::vector<FaceRegion>& plan, c
     const auto tables = std::make_unique<RegionalTables>();
     const auto state = std::make_unique<RegionalState>();
     const auto workspace = std::make_unique<RegionalWorkspace>();
-    const auto box = std::make_unique<BoxQpWorkspace>();
     RegionalOutput output;
     build_regional_tables(pack, *tables);
     const std::vector<Mat3> seen(markers, Mat3::Identity());
@@ -188,7 +187,7 @@ double error_of_regions(const Head& head, const std::vector<FaceRegion>& plan, c
             for (Index axis = 0; axis < 3; ++axis)
                 positions[k][axis] = motion.positions_mm(f, 3 * static_cast<Index>(k) + axis);
         }
-        solve_regions(pack, *tables, {positions, seen, confidence}, *state, *workspace, *box, output,
+        solve_regions(pack, *tables, {positions, seen, confidence}, *state, *workspace, output,
                       shape_weights);
         std::vector<Vec3> made(markers, Vec3::Zero());
         for (std::size_t r = 0; r < regions.size(); ++r) {

@@ -85,7 +85,8 @@ void expect_within_bounds(const StreamCase& c) {
     EXPECT_LE(errors.weight_rms, c.weight_rms.high);
     EXPECT_GE(errors.marker_rms_mm, c.marker_rms_mm.low);
     EXPECT_LE(errors.marker_rms_mm, c.marker_rms_mm.high);
-    EXPECT_LT(run.worst_kkt, 1e-6) << "every frame carries its certificate";
+    // What single precision owes: no variable would move by more than this in a projected Jacobi step.
+    EXPECT_LT(run.worst_kkt, 1e-5) << "every frame carries its certificate";
     EXPECT_GE(run.optimal, stream.frames - 10);
 }
 

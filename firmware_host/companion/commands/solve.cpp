@@ -14,6 +14,8 @@
 #include "firmware_host/companion/files/csv.hpp"
 #include "firmware_host/companion/files/npy.hpp"
 #include "firmware_host/pack_file/opened_pack.hpp"
+#include "firmware_host/settings/control_settings.hpp"
+#include "firmware_host/settings/settings_file.hpp"
 
 namespace rig::host {
 
@@ -28,6 +30,9 @@ struct SolveOptions {
     std::string points_npy;
     bool unlabelled = false;
     bool no_filter = false;
+    FilterSettings smoothing;
+    std::string controls_toml;
+    std::vector<std::string> controls;  // behind those of the file, so these win
     bool no_stabilise = false;
     double rate_hz = 60.0;
 };
@@ -42,9 +47,9 @@ struct SolveResults {
 
 std::vector<std::string> report_columns(const SolvePack& pack) {
     std::vector<std::string> columns{
-        "frame",        "state",           "kkt",         "objective",   "iterations",
-        "markers_used", "residual_rms_mm", "slip_rx_rad", "slip_ry_rad", "slip_rz_rad",
-        "slip_tx_mm",   "slip_ty_mm",      "slip_tz_mm"};
+        "frame",        "state",           "kkt",         "objective",    "iterations",
+        "markers_used", "residual_rms_mm", "slip_rx_rad", "slip_ry_rad",  "slip_rz_rad",
+        "slip_tx_mm",   "slip_ty_mm",      "slip_tz_mm",  "delay_frames", "delay_ms"};
     for (std::size_t r = 0; r < pack.region_count; ++r) {
         columns.push_back(fmt::format("{}_residual_mm", pack.regions[r].name));
         columns.push_back(fmt::format("{}_confidence", pack.regions[r].name));
@@ -100,6 +105,7 @@ void add_report_row(std::size_t frame, const SolvePack& pack, const FaceState& s
     csv.integer(report.markers_used).number(report.residual_rms_mm, 6);
     for (const float r : state.slip.rotation_rad) csv.number(static_cast<double>(r), 7);
     for (const float t : state.slip.translation_mm) csv.number(static_cast<double>(t), 5);
+    csv.integer(report.delay_frames).number(static_cast<double>(report.delay_us) * 1e-3, 3);
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
     for (std::size_t r = 0; r < pack.region_count; ++r) {
         csv.number(report.solved ? regions.regions[r].residual_rms_mm : kNone, 6);
@@ -187,7 +193,49 @@ Result<void, FileError> save_results(const SolveOptions& options, const SolveRes
     return {};
 }
 
-int run_solve(const SolveOptions& options) {
+Result<PipelineConfig, std::string> pipeline_config(const SolveOptions& options, const SolvePack& pack) {
+    PipelineConfig config;
+    config.filter = !options.no_filter && !smooths_nothing(options.smoothing);
+    config.stabilise = !options.no_stabilise;
+    config.rate_hz = options.rate_hz;
+    const auto choice = filter_choice(options.smoothing, std::span(pack.shape_names).first(pack.shape_count));
+    if (!choice) return failure("--filter: " + choice.error());
+    config.smoothing = *choice;
+    return config;
+}
+
+// What the command line says goes before what the file says.
+Result<SolveOptions, std::string> with_settings_file(const SolveOptions& options) {
+    if (options.controls_toml.empty()) return options;
+    auto file = read_settings_file(options.controls_toml);
+    if (!file) return failure(file.error());
+    SolveOptions both = options;
+    both.smoothing = merged(file->smoothing, options.smoothing);
+    both.controls = std::move(file->controls);
+    both.controls.insert(both.controls.end(), options.controls.begin(), options.controls.end());
+    return both;
+}
+
+Result<void, std::string> set_controls(const SolveOptions& options, const SolvePack& pack,
+                                       Pipeline& pipeline) {
+    const auto edits = parse_controls(options.controls, std::span(pack.shape_names).first(pack.shape_count));
+    if (!edits) return failure(edits.error());
+    auto set = std::make_unique<ControlSet>();
+    for (const ControlEdit& edit : *edits) {
+        if (!edit_controls(edit, pack.shape_count, *set))
+            return failure(std::string("there is no room for so many pairs"));
+    }
+    if (!pipeline.set_controls(*set)) return failure(std::string("the solver refuses these controls"));
+    return {};
+}
+
+int run_solve(const SolveOptions& command_line) {
+    const auto with_file = with_settings_file(command_line);
+    if (!with_file) {
+        print_error(with_file.error());
+        return kExitInput;
+    }
+    const SolveOptions& options = *with_file;
     const auto opened = open_pack_file(options.pack);
     if (!opened) {
         print_error(opened.error().message);
@@ -203,14 +251,19 @@ int run_solve(const SolveOptions& options) {
         print_error(fits.error().message);
         return kExitInput;
     }
-    PipelineConfig config;
-    config.filter = !options.no_filter;
-    config.stabilise = !options.no_stabilise;
-    config.rate_hz = options.rate_hz;
+    const auto config = pipeline_config(options, pack);
+    if (!config) {
+        print_error(config.error());
+        return kExitUsage;
+    }
     auto pipeline = std::make_unique<Pipeline>();
-    if (!pipeline->configure(pack, config)) {
+    if (!pipeline->configure(pack, *config)) {
         print_error(options.pack + ": the solver refuses this pack; train it again with this version");
         return kExitInput;
+    }
+    if (const auto set = set_controls(options, pack, *pipeline); !set) {
+        print_error(set.error());
+        return kExitUsage;
     }
     SolveResults results{CsvWriter(weight_columns(pack)), CsvWriter(report_columns(pack)), {}, {}};
     results.labels.shape = {stream->shape[0], stream->shape[1]};
@@ -224,6 +277,25 @@ int run_solve(const SolveOptions& options) {
     }
     if (options.weights_csv.empty()) fmt::print("{}", results.weights.contents());
     return kExitOk;
+}
+
+void add_filter_options(CLI::App& verb, SolveOptions& options) {
+    verb.add_option_function<std::string>(
+            "--filter", [&options](const std::string& word) { options.smoothing.kind = filter_kind(word); },
+            "Smoothing of every shape: none (as --no-filter), one-euro (the "
+            "default) or savitzky-golay")
+        ->check(CLI::IsMember({"none", "one-euro", "savitzky-golay"}).description(""))
+        ->type_name("KIND")
+        ->excludes("--no-filter");
+    verb.add_option("--window", options.smoothing.window_frames,
+                    "savitzky-golay: frames that a fit goes through, 3 to 61 (15)")
+        ->check(CLI::Range(3, static_cast<int>(kMaxWindowFrames)).description(""))
+        ->type_name("FRAMES");
+    verb.add_option("--delay", options.smoothing.delay_frames,
+                    "savitzky-golay: how far back the answer lies, below the window (half of it); each row "
+                    "then holds the weights of that earlier frame, see delay_ms of the report")
+        ->check(CLI::Range(0, static_cast<int>(kMaxWindowFrames) - 1).description(""))
+        ->type_name("FRAMES");
 }
 
 }  // namespace
@@ -253,6 +325,12 @@ void add_solve_verb(CLI::App& app, int& exit_code) {
         ->check(CLI::Range(1.0, 1000.0));
     verb->add_flag("--no-filter", options->no_filter,
                    "No smoothing, no recovery blends (a pack's temporal prior stays)");
+    add_filter_options(*verb, *options);
+    verb->add_option("--controls", options->controls_toml,
+                     "Artist's controls and smoothing, firmware_host/settings/settings_file.hpp")
+        ->type_name("FILE.toml");
+    verb->add_option("--set", options->controls, "One control, WHO.CONTROL=VALUE as in `headrig control`")
+        ->type_name("CONTROL");
     verb->add_flag("--no-stabilise", options->no_stabilise, "The stream is in the face frame already");
     verb->footer(
         "Examples:\n"
@@ -260,6 +338,8 @@ void add_solve_verb(CLI::App& app, int& exit_code) {
         "  headrig solve --pack face.pack --markers take.npy --out weights.csv --report report.csv\n"
         "  headrig solve --pack face.pack --markers cloud.npy --unlabelled --labels names.npy --out "
         "weights.csv\n"
+        "  headrig solve --pack face.pack --markers take.npy --filter savitzky-golay --window 15 --delay 7 "
+        "--out w.csv\n"
         "Exit codes: 0 done, 2 wrong command line, 3 an input is missing or malformed, 4 an output could not "
         "be\n"
         "written, 130 interrupted.");

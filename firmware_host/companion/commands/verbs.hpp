@@ -16,6 +16,7 @@ inline constexpr int kExitInterrupted = 130;
 
 // Each adds its subcommand to `app` and stores its exit code in `exit_code` when it is run. One a line, in
 // alphabetical order.
+void add_control_verb(CLI::App& app, int& exit_code);
 void add_demo_verb(CLI::App& app, int& exit_code);
 void add_detect_verb(CLI::App& app, int& exit_code);
 void add_import_verb(CLI::App& app, int& exit_code);
@@ -26,6 +27,7 @@ void add_pack_verb(CLI::App& app, int& exit_code);
 void add_record_verb(CLI::App& app, int& exit_code);
 void add_replay_verb(CLI::App& app, int& exit_code);
 void add_sample_verb(CLI::App& app, int& exit_code);
+void add_smooth_verb(CLI::App& app, int& exit_code);
 void add_solve_verb(CLI::App& app, int& exit_code);
 void add_status_verb(CLI::App& app, int& exit_code);
 void add_train_verb(CLI::App& app, int& exit_code);

@@ -184,6 +184,10 @@ void HostSession::take_ack(ByteSpan payload) {
         return;
     }
     const auto type = static_cast<MessageType>(ack->type);
+    if (type == MessageType::kControl && !controls_.empty() && ack->sequence == control_sequence_) {
+        controls_.pop_front();
+        control_asked_us_.reset();
+    }
     if (phase_ == SessionPhase::kClaiming && type == MessageType::kHello) {
         refusal_.clear();
         enter(SessionPhase::kNaming);
@@ -200,6 +204,10 @@ void HostSession::take_nak(ByteSpan payload) {
         return;
     }
     const auto type = static_cast<MessageType>(nak->type);
+    if (type == MessageType::kControl && !controls_.empty() && nak->sequence == control_sequence_) {
+        control_refusal_ = nak->reason;
+        controls_.clear();
+    }
     if (type != MessageType::kHello && type != MessageType::kStartStreams) return;
     switch (nak->reason) {
         case NakReason::kBusy:
@@ -308,6 +316,7 @@ void HostSession::watch_silence(std::int64_t now_us) {
 
 void HostSession::ask(std::int64_t now_us) {
     ask_time(now_us);
+    ask_control(now_us);
     if (command_ && phase_ == SessionPhase::kReady) {
         send(MessageType::kCommand, CommandMessage{*command_});
         command_.reset();
@@ -348,6 +357,14 @@ void HostSession::ask(std::int64_t now_us) {
 void HostSession::ask_names() {
     const std::vector<std::string>& names = naming_ == NameKind::kShapes ? shape_names_ : marker_names_;
     send(MessageType::kNamesRequest, NamesRequest{naming_, static_cast<std::uint16_t>(names.size())});
+}
+
+void HostSession::ask_control(std::int64_t now_us) {
+    if (controls_.empty() || phase_ != SessionPhase::kReady) return;
+    if (!is_due(control_asked_us_, now_us, kAskAgain_us)) return;
+    control_asked_us_ = now_us;
+    control_sequence_ = sequence_;
+    send(MessageType::kControl, controls_.front());
 }
 
 void HostSession::ask_time(std::int64_t now_us) {

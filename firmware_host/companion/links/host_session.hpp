@@ -4,11 +4,13 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/wire/control_message.hpp"
 #include "core/wire/frame.hpp"
 #include "core/wire/health.hpp"
 #include "core/wire/session_messages.hpp"
@@ -81,6 +83,11 @@ class HostSession {
     void request_status() { status_wanted_ = true; }
     // Sent at the next poll(), once: commands are not repeated, since a second neutral is not the first.
     void command(BoardCommand command) { command_ = command; }
+    // Sent in their order, each repeated until the board has accepted it: controls are absolute.
+    void control(const ControlMessage& message) { controls_.push_back(message); }
+    [[nodiscard]] std::size_t controls_waiting() const { return controls_.size(); }
+    // Why the board refused a control; the ones behind it are forgotten then.
+    [[nodiscard]] const std::optional<NakReason>& control_refusal() const { return control_refusal_; }
     // Stops the streams and says goodbye; no poll() after it.
     void leave();
 
@@ -120,6 +127,7 @@ class HostSession {
     void watch_silence(std::int64_t now_us);
     void ask(std::int64_t now_us);
     void ask_names();
+    void ask_control(std::int64_t now_us);
     void ask_time(std::int64_t now_us);
     void refuse(std::string why);
 
@@ -152,6 +160,10 @@ class HostSession {
     bool status_wanted_ = false;
     std::optional<std::int64_t> status_asked_us_;
     std::optional<BoardCommand> command_;
+    std::deque<ControlMessage> controls_;
+    std::optional<std::int64_t> control_asked_us_;
+    std::uint32_t control_sequence_ = 0;  // of the frame that carried the first of them last
+    std::optional<NakReason> control_refusal_;
 
     FrameDecoder decoder_;
     StateAssembler states_;

@@ -29,6 +29,7 @@ PipelineConfig config_of(const ObservationLogHeader& header) {
     PipelineConfig config;
     config.filter = header.filter;
     config.stabilise = header.stabilise;
+    config.smoothing = header.smoothing;
     config.rate_hz = static_cast<double>(header.rate_millihertz) * 1e-3;
     config.loss_policy = header.loss_policy == 1 ? LossPolicy::kDecay : LossPolicy::kHold;
     return config;
@@ -84,6 +85,10 @@ Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const O
             break;
         }
         if (next->reset_before) pipeline->reset_tracking();
+        if (next->new_controls != nullptr && !pipeline->set_controls(*next->new_controls)) {
+            return failure(FileError{request.log.string() + ": sets controls of shapes that " +
+                                     request.pack_name + " does not have"});
+        }
         pipeline->step(frame_of(*next, reader->header().camera_count), *state, *report);
         digest.add(*state);
         if (digest.ticks() == 1) first_us = next->capture_us;

@@ -225,15 +225,14 @@ MatrixXd key_shape_weights(const MatrixXd& positions_mm, const MatrixXd& shapes_
         positions_mm * shapes_mm.transpose();
     const auto state = std::make_unique<NnlsState>();
     const auto workspace = std::make_unique<NnlsWorkspace>();
-    const auto box = std::make_unique<BoxQpWorkspace>();
     MatrixXd weights(positions_mm.rows(), k);
     std::array<double, kMaxRegionShapes> w{};
     const auto n = static_cast<std::size_t>(k);
     worst_kkt = 0.0;
     for (Index f = 0; f < positions_mm.rows(); ++f) {
         const NnlsProblem problem{n, n, {gram.data(), n * n}, {linear.row(f).data(), n}};
-        const BoxQpReport report = solve_nnls(problem, *state, *workspace, *box, w);
-        worst_kkt = std::max(worst_kkt, static_cast<double>(report.kkt));
+        const BoxQpReport report = solve_nnls(problem, *state, *workspace, w);
+        worst_kkt = std::max(worst_kkt, report.kkt);
         for (Index i = 0; i < k; ++i) weights(f, i) = w[static_cast<std::size_t>(i)];
     }
     return weights;

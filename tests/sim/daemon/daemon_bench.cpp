@@ -93,6 +93,7 @@ DaemonBench::DaemonBench(BenchOptions options)
     if (options_.with_pack) {
         PipelineConfig pipeline;
         pipeline.rate_hz = kTakeRate_hz;
+        pipeline.smoothing = options_.smoothing;
         RIG_CHECK(pipeline_->configure(take.pack(), pipeline).has_value());
         parts.pack = &take.pack();
         config.identity.hello.shape_count = take.pack().shape_count;
@@ -104,6 +105,7 @@ DaemonBench::DaemonBench(BenchOptions options)
         ObservationLogHeader header;
         header.camera_count = 2;
         header.rate_millihertz = 60'000;
+        header.smoothing = options_.smoothing;
         log_ = std::move(*ObservationLogWriter::create(options_.log_path, header));
         parts.log = log_.get();
     }

@@ -74,6 +74,7 @@ struct BenchOptions {
     std::size_t link_capacity = 16384;
     std::string log_path;
     int frozen_frames = 3;
+    FilterChoice smoothing;
 };
 
 class DaemonBench {

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <set>
 
+#include "core/wire/control_message.hpp"
 #include "tests/sim/daemon/daemon_bench.hpp"
 #include "tests/sim/daemon/painted_take.hpp"
 #include "tests/support/random.hpp"
@@ -17,6 +18,15 @@ namespace {
 using sim::FaultKind;
 
 constexpr std::int64_t kFrame_us = 16'667;
+
+ControlMessage control_of(ControlKind kind, std::initializer_list<std::size_t> shapes, float value,
+                          float high = 0.0F) {
+    ControlMessage message;
+    ControlEdit edit{kind, value, high, 0, 0, {}};
+    for (const std::size_t shape : shapes) put_in(edit.shapes, shape);
+    static_cast<void>(message.edits.push_back(edit));
+    return message;
+}
 
 sim::FaultEvent fault(FaultKind what, int from_frame, int frames, std::uint8_t target,
                       double magnitude = 0.0) {
@@ -309,6 +319,78 @@ TEST(DaemonLockstep, ResetComesFromTheHostToo) {
     EXPECT_EQ(decode_nak(*bench.host.last(MessageType::kNak))->reason, NakReason::kNotNow);
 }
 
+// The wish of an artist is in the weights of the next tick, and only in those it was for.
+TEST(DaemonLockstep, ALiveControlChangesTheStreamedWeights) {
+    DaemonBench plain;
+    static_cast<void>(plain.run());
+    DaemonBench bench;
+    bench.before_tick = [](DaemonBench& b, std::uint32_t tick) {
+        if (tick == 30)
+            b.host.send(MessageType::kControl, control_of(ControlKind::kRange, {0, 5}, 0.25F, 0.5F));
+        if (tick == 45)
+            b.host.send(MessageType::kControl, ControlMessage{.neutral_first = true, .edits = {}});
+    };
+    static_cast<void>(bench.run());
+    EXPECT_EQ(bench.host.count(MessageType::kAck), 2U);
+    ASSERT_EQ(bench.host.states.size(), 60U);
+    bool narrowed = false;
+    for (std::size_t i = 0; i < 60; ++i) {
+        const FaceState& state = bench.host.states[i];
+        const FaceState& before = plain.host.states[i];
+        if (i < 30) {
+            EXPECT_EQ(state.weights, before.weights) << i;
+            narrowed = narrowed || before.weights[0] < 0.2F || before.weights[5] < 0.2F;
+        }
+        if (i > 31 && i < 45) {
+            for (const std::size_t shape : {0U, 5U})
+                EXPECT_TRUE(state.weights[shape] >= 0.25F && state.weights[shape] <= 0.5F) << i;
+        }
+    }
+    EXPECT_TRUE(narrowed) << "the range was no news";
+    EXPECT_NE(bench.app().digest().value(), plain.app().digest().value());
+    EXPECT_NEAR(bench.host.states[59].weights[0], plain.host.states[59].weights[0], 0.02F);
+}
+
+TEST(DaemonLockstep, ControlsThatCannotBeAreRefusedWhole) {
+    DaemonBench plain;
+    static_cast<void>(plain.run());
+    DaemonBench bench;
+    bench.before_tick = [](DaemonBench& b, std::uint32_t tick) {
+        if (tick != 20) return;
+        ControlMessage message = control_of(ControlKind::kOffset, {0}, 0.5F);
+        ControlEdit beyond = message.edits[0];
+        put_in(beyond.shapes, 200);  // the pack has 30
+        static_cast<void>(message.edits.push_back(beyond));
+        b.host.send(MessageType::kControl, message);
+    };
+    static_cast<void>(bench.run());
+    EXPECT_EQ(decode_nak(*bench.host.last(MessageType::kNak))->reason, NakReason::kBadValue);
+    EXPECT_EQ(bench.app().digest().value(), plain.app().digest().value());
+    BenchOptions options;
+    options.with_pack = false;
+    DaemonBench safe(options);
+    safe.before_tick = [](DaemonBench& b, std::uint32_t tick) {
+        if (tick == 5) b.host.send(MessageType::kControl, control_of(ControlKind::kOffset, {0}, 0.5F));
+    };
+    static_cast<void>(safe.run());
+    EXPECT_EQ(decode_nak(*safe.host.last(MessageType::kNak))->reason, NakReason::kNotNow);
+}
+
+// Age is true: the weights are of the frame that the filter answers for.
+TEST(DaemonLockstep, TheDelayOfTheFilterIsInCaptureTimeAndAge) {
+    DaemonBench plain;
+    static_cast<void>(plain.run());
+    BenchOptions options;
+    options.smoothing = same_filter({FilterKind::kSavitzkyGolay, 15}, 7);
+    DaemonBench delayed(options);
+    static_cast<void>(delayed.run());
+    ASSERT_EQ(delayed.host.states.size(), 60U);
+    const FaceState& now = plain.host.states[50];
+    const FaceState& late = delayed.host.states[50];
+    EXPECT_EQ(late.capture_us, plain.host.states[43].capture_us);
+    EXPECT_EQ(late.age_us - now.age_us, now.capture_us - late.capture_us);
+}
+
 TEST(DaemonLockstep, HostileBytesChangeNothing) {
     DaemonBench quiet;
     static_cast<void>(quiet.run());
@@ -316,14 +398,14 @@ TEST(DaemonLockstep, HostileBytesChangeNothing) {
     SeededRandom random(3);
     bench.before_tick = [&](DaemonBench& b, std::uint32_t) {
         for (int i = 0; i < 30; ++i) {
-            std::array<std::byte, 200> bytes{};
+            std::array<std::byte, 256> bytes{};
             for (std::byte& each : bytes) each = static_cast<std::byte>(random.below(256));
-            const auto length = static_cast<std::size_t>(random.below(bytes.size()));
+            const auto length = static_cast<std::size_t>(random.below(200));  // | 64 stays inside
             if (i % 2 == 0) b.host.send_bytes(ByteSpan(bytes).first(length));
             // Whole frames of every type, right and wrong lengths. Not those that do change something:
             // streams, reset.
             const auto type = static_cast<std::uint8_t>(random.below(256));
-            const bool asks = type >= 0x20 && type <= 0x23;
+            const bool asks = type >= 0x20 && type <= 0x24;
             if (i % 2 == 1 && !asks)
                 b.host.send(static_cast<MessageType>(type), ByteSpan(bytes).first(length));
             if (i % 2 == 1 && asks)
@@ -364,6 +446,8 @@ TEST(DaemonLockstep, TheObservationLogRepeatsTheRun) {
     DaemonBench bench(options);
     bench.before_tick = [](DaemonBench& b, std::uint32_t tick) {
         if (tick == 100) b.button.drive(true);
+        if (tick == 60)
+            b.host.send(MessageType::kControl, control_of(ControlKind::kMultiplier, {0, 1, 2}, 0.5F));
     };
     static_cast<void>(bench.run());
 
@@ -380,10 +464,15 @@ TEST(DaemonLockstep, TheObservationLogRepeatsTheRun) {
     StreamDigest digest;
     FaceState state;
     FrameReport report;
+    int control_changes = 0;
     while (!log.at_end()) {
         const auto tick = log.next();
         ASSERT_TRUE(tick.has_value());
         if (tick->reset_before) pipeline->reset_tracking();
+        if (tick->new_controls != nullptr) {
+            ASSERT_TRUE(pipeline->set_controls(*tick->new_controls).has_value());
+            ++control_changes;
+        }
         ObservationFrame frame;
         frame.capture_us = tick->capture_us;
         frame.camera_count = log.header().camera_count;
@@ -394,6 +483,7 @@ TEST(DaemonLockstep, TheObservationLogRepeatsTheRun) {
         static_cast<void>(gate.pass(state));
         digest.add(state);
     }
+    EXPECT_EQ(control_changes, 1);
     EXPECT_EQ(digest.ticks(), bench.app().digest().ticks());
     EXPECT_EQ(digest.value(), bench.app().digest().value());
 }

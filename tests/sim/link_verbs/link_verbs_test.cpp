@@ -139,6 +139,27 @@ TEST_F(LinkVerbs, StatusListsEveryFaultWithoutARig) {
     EXPECT_TRUE(ran.out.starts_with("F01 "));
 }
 
+TEST_F(LinkVerbs, ControlSetsAndRefuses) {
+    const auto board = board_on_pty();
+    Ran ran = run({"control", "--link", path("rig"), "--set", "shape_1.sparsity=2", "--set",
+                   "all.range=0,0.8", "--set", "shape_2,shape_3.cancel=1"});
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_EQ(ran.out, "3 controls set\n");
+    ran = run({"control", "--link", path("rig"), "--set", "ears.sparsity=2"});
+    EXPECT_EQ(ran.exit_code, 2);
+    EXPECT_TRUE(has(ran.err, "'ears' is neither a shape of this rig nor a region")) << ran.err;
+    EXPECT_EQ(run({"control", "--link", path("rig"), "--controls", path("nosuch.toml")}).exit_code, 3);
+    ran = run({"control", "--link", path("rig"), "--list-shapes"});
+    EXPECT_EQ(ran.out, "shape_0\nshape_1\nshape_2\nshape_3\nshape_4\n");
+}
+
+TEST_F(LinkVerbs, ControlTellsWhenTheBoardSaysNo) {
+    const auto board = board_on_pty({.busy = true});
+    const Ran ran = run({"control", "--link", path("rig"), "--neutral"});
+    EXPECT_EQ(ran.exit_code, 5);
+    EXPECT_TRUE(has(ran.err, "does not allow")) << ran.err;
+}
+
 TEST_F(LinkVerbs, MonitorIsPlainOnAPipe) {
     const auto board = board_on_pty();
     const Ran ran = run({"monitor", "--link", path("rig"), "--seconds", "2.5"});

@@ -3,6 +3,7 @@
 #include <array>
 #include <utility>
 
+#include "core/wire/control_message.hpp"
 #include "core/wire/health.hpp"
 #include "core/wire/session_messages.hpp"
 #include "core/wire/state_messages.hpp"
@@ -94,6 +95,8 @@ Result<Bytes, WireError> reencoded(MessageType type, ByteSpan payload) {
             return again(decode_stop_streams(payload));
         case MessageType::kCommand:
             return again(decode_command(payload));
+        case MessageType::kControl:
+            return again(decode_control(payload));
         case MessageType::kAck:
             return again(decode_ack(payload));
         case MessageType::kNak:

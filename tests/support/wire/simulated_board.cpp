@@ -89,6 +89,11 @@ void SimulatedBoard::take(const FrameView& frame, std::int64_t now_us) {
         case MessageType::kCommand:
             ++commands_;
             return answer(frame, true);
+        case MessageType::kControl: {
+            const auto message = decode_control(frame.payload);
+            if (message && !options_.busy) controls_.push_back(*message);
+            return answer(frame, message.has_value());
+        }
         case MessageType::kGoodbye:
             ++goodbyes_;
             return;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/wire/control_message.hpp"
 #include "core/wire/frame.hpp"
 #include "core/wire/health.hpp"
 #include "core/wire/session_messages.hpp"
@@ -43,6 +44,7 @@ class SimulatedBoard {
     [[nodiscard]] std::uint32_t ticks() const { return tick_; }
     [[nodiscard]] bool streams_weights() const { return (streams_ & kStreamWeights) != 0; }
     [[nodiscard]] std::uint64_t commands() const { return commands_; }
+    [[nodiscard]] const std::vector<ControlMessage>& controls() const { return controls_; }
     [[nodiscard]] std::uint64_t goodbyes() const { return goodbyes_; }
     [[nodiscard]] std::uint64_t lost() const { return lost_; }
 
@@ -73,6 +75,7 @@ class SimulatedBoard {
     StartStreams dividers_;
     bool muted_ = false;
     std::uint64_t commands_ = 0;
+    std::vector<ControlMessage> controls_;
     std::uint64_t goodbyes_ = 0;
     std::uint64_t lost_ = 0;
 };

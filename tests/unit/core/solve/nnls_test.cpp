@@ -33,9 +33,8 @@ struct Fit {
 
 BoxQpReport solve_with(const Fit& fit, NnlsState& state, std::vector<double>& w) {
     static const auto workspace = std::make_unique<NnlsWorkspace>();
-    static const auto box = std::make_unique<BoxQpWorkspace>();
     w.assign(fit.n, -1.0);
-    return solve_nnls(fit.view(), state, *workspace, *box, w);
+    return solve_nnls(fit.view(), state, *workspace, w);
 }
 
 std::vector<double> random_shapes(std::size_t rows, std::size_t n, test::SeededRandom& random) {

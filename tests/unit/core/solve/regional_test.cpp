@@ -47,15 +47,14 @@ class Face {
     }
 
     void solve() {
-        solve_regions(sample.view, *tables, {positions, weights, confidence}, *state, *workspace, *box,
-                      output, shape_weights);
+        solve_regions(sample.view, *tables, {positions, weights, confidence}, *state, *workspace, output,
+                      shape_weights);
     }
 
     SamplePack sample;
     std::unique_ptr<RegionalTables> tables = std::make_unique<RegionalTables>();
     std::unique_ptr<RegionalState> state = std::make_unique<RegionalState>();
     std::unique_ptr<RegionalWorkspace> workspace = std::make_unique<RegionalWorkspace>();
-    std::unique_ptr<BoxQpWorkspace> box = std::make_unique<BoxQpWorkspace>();
     std::vector<Vec3> positions;
     std::vector<Mat3> weights;
     std::vector<float> confidence;

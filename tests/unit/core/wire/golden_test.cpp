@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "core/wire/control_message.hpp"
 #include "core/wire/health.hpp"
 #include "core/wire/session_messages.hpp"
 #include "core/wire/state_messages.hpp"
@@ -154,6 +155,17 @@ EventMessage example_event() {
     return event;
 }
 
+ControlMessage example_control() {
+    ControlMessage message;
+    message.neutral_first = true;
+    message.edits.resize(2);
+    message.edits[0].value = 2.0F;
+    put_in(message.edits[0].shapes, 0);
+    put_in(message.edits[0].shapes, 9);
+    message.edits[1] = {ControlKind::kCancel, 1.0F, 0.0F, 3, 4, {}};
+    return message;
+}
+
 std::map<std::string, Example> examples() {
     return {
         {"hello_request", {MessageType::kHelloRequest, 0, 1, {}}},
@@ -173,6 +185,7 @@ std::map<std::string, Example> examples() {
         {"stop_streams", {MessageType::kStopStreams, 0, 14, payload_of(StopStreams{7})}},
         {"status_request", {MessageType::kStatusRequest, 0, 15, {}}},
         {"command", {MessageType::kCommand, 0, 16, payload_of(CommandMessage{BoardCommand::kResetTracking})}},
+        {"control", {MessageType::kControl, 0, 19, payload_of(example_control())}},
         {"ack", {MessageType::kAck, 1, 17, payload_of(AckMessage{0x20, 13})}},
         {"nak", {MessageType::kNak, 1, 18, payload_of(NakMessage{NakReason::kBadLength, 0x21, 14})}},
     };

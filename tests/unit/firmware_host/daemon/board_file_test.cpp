@@ -38,6 +38,13 @@ TEST_F(BoardFileTest, DefaultsAreFilledIn) {
     EXPECT_TRUE(board->cameras.empty());
 }
 
+TEST_F(BoardFileTest, ABoardMaySayHowToSmooth) {
+    const auto board = load("name = 'x'\n[smoothing]\nfilter = 'savitzky-golay'\nwindow = 21\n");
+    ASSERT_TRUE(board.has_value());
+    EXPECT_EQ(board->smoothing.kind, FilterKind::kSavitzkyGolay);
+    EXPECT_EQ(board->smoothing.window_frames, 21);
+}
+
 TEST_F(BoardFileTest, MistakesNameTheFileAndTheFault) {
     const std::vector<std::pair<const char*, const char*>> mistakes{
         {"name = ", "line 1"},
@@ -48,6 +55,8 @@ TEST_F(BoardFileTest, MistakesNameTheFileAndTheFault) {
         {"name = 'x'\nfrozen_frames = -3", "'frozen_frames'"},
         {"name = 'x'\nwatchdog_ms = 5", "'watchdog_ms'"},
         {"name = 'x'\ncolour = 'red'", "'colour'"},
+        {"name = 'x'\nsmoothing = 3", "'smoothing'"},
+        {"name = 'x'\n[smoothing]\nfilter = 'median'", "[smoothing]: 'filter'"},
         {"name = 'x'\ncamera = 3", "[[camera]]"},
         {"name = 'x'\n[[camera]]\nname = 'a'", "a source"},
         {"name = 'x'\n[[camera]]\nname = 'a'\nsource = 'b'\nlens = 3", "'lens'"},

@@ -20,6 +20,9 @@ ObservationLogHeader header() {
     result.stabilise = false;
     result.loss_policy = 1;
     result.pack_hash.fill(std::byte{0x5C});
+    result.smoothing.delay_frames = 4;
+    result.smoothing.shapes[1] = {FilterKind::kNone};
+    result.smoothing.shapes[2] = {FilterKind::kSavitzkyGolay, 61};
     return result;
 }
 
@@ -45,6 +48,11 @@ class ObservationLogTest : public testing::Test {
   protected:
     // Twenty ticks with 0 .. kMaxObservations dots.
     void write(int ticks = 20) {
+        controls_.shapes[3] = {2.0F, 3.0F, 0.5F, -1.0F, 0.125F, -0.5F, 0.75F};
+        controls_.symmetry.clear();
+        controls_.cancel.clear();
+        ASSERT_TRUE(controls_.symmetry.push_back({1, 2, 8.0F}) && controls_.cancel.push_back({4, 5}) &&
+                    controls_.cancel.push_back({255, 0}));
         auto writer = ObservationLogWriter::create(path_, header());
         ASSERT_TRUE(writer.has_value());
         for (int i = 0; i < ticks; ++i) {
@@ -54,6 +62,7 @@ class ObservationLogTest : public testing::Test {
             tick.number = static_cast<std::uint32_t>(i);
             tick.capture_us = 1'000'000 + 16'667 * i;
             tick.reset_before = i == 7;
+            if (i % 5 == 2) tick.new_controls = &controls_;
             tick.status = {CameraStatus::kGood, CameraStatus::kExposure, CameraStatus::kGone,
                            CameraStatus::kGone};
             tick.cameras = {left_.back(), right_.back()};
@@ -67,6 +76,7 @@ class ObservationLogTest : public testing::Test {
     TempFolder folder_;
     std::string path_ = folder_ / "take.rgo";
     SeededRandom random_{5};
+    ControlSet controls_;
     std::vector<std::vector<Observation>> left_;
     std::vector<std::vector<Observation>> right_;
 };
@@ -84,6 +94,14 @@ TEST_F(ObservationLogTest, WhatIsWrittenIsRead) {
         EXPECT_EQ(tick->number, i);
         EXPECT_EQ(tick->capture_us, 1'000'000 + 16'667 * i);
         EXPECT_EQ(tick->reset_before, i == 7);
+        ASSERT_EQ(tick->new_controls != nullptr, i % 5 == 2);
+        if (tick->new_controls != nullptr) {
+            EXPECT_EQ(tick->new_controls->shapes, controls_.shapes);
+            ASSERT_EQ(tick->new_controls->symmetry.size(), 1U);
+            EXPECT_EQ(tick->new_controls->symmetry[0], controls_.symmetry[0]);
+            ASSERT_EQ(tick->new_controls->cancel.size(), 2U);
+            EXPECT_EQ(tick->new_controls->cancel[1], controls_.cancel[1]);
+        }
         EXPECT_EQ(tick->status[1], CameraStatus::kExposure);
         EXPECT_EQ(tick->status[2], CameraStatus::kUnused);  // beyond the count
         ASSERT_EQ(tick->cameras[0].size(), left_[i].size());
@@ -94,6 +112,32 @@ TEST_F(ObservationLogTest, WhatIsWrittenIsRead) {
         }
     }
     EXPECT_TRUE(reader->at_end());
+}
+
+// Version 1 ended its header at byte 64 and knew One Euro only.
+TEST_F(ObservationLogTest, TheFirstVersionIsRead) {
+    write(4);
+    std::string text = contents(path_);
+    text.erase(64, kMaxShapes);
+    text[4] = 1;
+    text[48] = 0;
+    auto reader = ObservationLogReader::open(bytes_of(text));
+    ASSERT_TRUE(reader.has_value());
+    EXPECT_EQ(reader->header().smoothing, FilterChoice{});
+    int ticks = 0;
+    for (; !reader->at_end(); ++ticks) ASSERT_TRUE(reader->next().has_value());
+    EXPECT_EQ(ticks, 4);
+    text[48] = 4;
+    EXPECT_FALSE(ObservationLogReader::open(bytes_of(text)).has_value());
+}
+
+TEST_F(ObservationLogTest, ImpossibleSmoothingIsNoLog) {
+    write(1);
+    for (const auto& [at, value] : {std::pair{48, 61}, {64, 2}, {64, 4}, {300, 62}}) {
+        std::string text = contents(path_);
+        text[static_cast<std::size_t>(at)] = static_cast<char>(value);
+        EXPECT_EQ(ObservationLogReader::open(bytes_of(text)).error(), ObservationLogError::kFormat) << at;
+    }
 }
 
 TEST_F(ObservationLogTest, EveryTruncationKeepsTheWholeRecordsBeforeIt) {
@@ -143,7 +187,7 @@ TEST_F(ObservationLogTest, OtherFilesAreRefused) {
         return ObservationLogReader::open(bytes_of(text)).has_value();
     };
     EXPECT_FALSE(with(0, 'X'));
-    EXPECT_FALSE(with(4, 2));  // version
+    EXPECT_FALSE(with(4, 3));  // version
     EXPECT_FALSE(with(6, 0));  // cameras
     EXPECT_FALSE(with(6, 5));
     EXPECT_FALSE(with(7, 1));     // reserved

@@ -196,6 +196,39 @@ TEST(HostSession, ARefusalIsToldAndTriedAgain) {
     EXPECT_FALSE(bench.states.empty());
 }
 
+ControlMessage offset_of(float value) {
+    ControlMessage message;
+    message.edits.resize(1);
+    message.edits[0] = {ControlKind::kOffset, value, 0.0F, 0, 0, {}};
+    return message;
+}
+
+TEST(HostSession, ControlsArriveInOrderThroughLoss) {
+    // Names and all, without owning the session.
+    Bench bench({.lose_every = 3}, {.streams = 0});
+    for (int i = 0; i < 20; ++i) bench.session.control(offset_of(0.25F * static_cast<float>(i)));
+    bench.run(15.0);
+    EXPECT_EQ(bench.session.controls_waiting(), 0U);
+    EXPECT_FALSE(bench.session.control_refusal().has_value());
+    std::vector<float> arrived;
+    for (const ControlMessage& message : bench.board.controls()) {
+        const float value = message.edits[0].value;
+        if (arrived.empty() || arrived.back() != value) arrived.push_back(value);  // repeated: same again
+    }
+    ASSERT_EQ(arrived.size(), 20U);
+    for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(arrived[i], 0.25F * static_cast<float>(i));
+}
+
+TEST(HostSession, ARefusedControlIsToldAndNotRepeated) {
+    Bench bench({.busy = true}, {.streams = 0});
+    bench.session.control(offset_of(0.5F));
+    bench.session.control(offset_of(0.75F));
+    bench.run(3.0);
+    EXPECT_EQ(bench.session.control_refusal(), NakReason::kBusy);
+    EXPECT_EQ(bench.session.controls_waiting(), 0U);
+    EXPECT_TRUE(bench.board.controls().empty());
+}
+
 TEST(HostSession, CommandsGoOnce) {
     Bench bench;
     bench.run(1.0);

@@ -1,0 +1,85 @@
+// solver_digest    solves generated trajectories and prints one digest of every weight's bits. The same
+// source is built several times, with other optimisation and other instruction sets;
+// tests/replay/solver_digests compares what they print. "unsupported" where the processor lacks what the
+// build was made for.
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include "core/solve/box_qp.hpp"
+#include "tests/support/digest.hpp"
+#include "tests/support/random.hpp"
+#include "tests/support/solver_problems.hpp"
+
+namespace {
+
+using namespace rig;
+
+bool supported() {
+#if defined(__AVX512F__)
+    return __builtin_cpu_supports("avx512f") != 0;
+#elif defined(__AVX2__)
+    return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+#else
+    return true;
+#endif
+}
+
+// A box QP whose markers come and go, so that the inverse follows H too.
+template <typename Real>
+void run(std::size_t rows, std::size_t shapes, double ridge, double high, test::Digest& digest) {
+    const test::SolverTrajectory data = test::make_solver_trajectory(rows, shapes, 120, 5);
+    const std::vector<double> gram = test::gram_of(data, ridge);
+    const std::size_t stride = row_stride(shapes);
+    std::vector<Real> basis(rows * stride, Real(0)), h(shapes * stride, Real(0)), q(stride, Real(0));
+    for (std::size_t r = 0; r < rows; ++r) {
+        for (std::size_t i = 0; i < shapes; ++i)
+            basis[r * stride + i] = static_cast<Real>(data.basis[r * shapes + i]);
+    }
+    for (std::size_t i = 0; i < shapes; ++i) {
+        for (std::size_t j = 0; j < shapes; ++j) h[i * stride + j] = static_cast<Real>(gram[i * shapes + j]);
+    }
+    const std::vector<Real> low(shapes, Real(0)), top(shapes, static_cast<Real>(high));
+    std::vector<Real> w(shapes, Real(0)), t(rows);
+    const auto state = std::make_unique<BoxQpState<Real>>();
+    const auto workspace = std::make_unique<BoxQpWorkspace<Real>>();
+    test::SeededRandom random(6);
+    std::uint32_t version = 1;
+    std::vector<char> hidden(rows, 0);
+    for (std::size_t f = 0; f < data.targets.size(); ++f) {
+        if (f % 10 == 9) {
+            const std::size_t row = random.below(rows);
+            const std::span<const Real> z(basis.data() + row * stride, shapes);
+            hidden[row] = hidden[row] == 0 ? 1 : 0;
+            if (hidden[row] != 0) subtract_square(h.data(), stride, shapes, z.data());
+            if (hidden[row] == 0) add_square(h.data(), stride, shapes, z.data());
+            follow_hessian(*state, z, hidden[row] == 0);
+            settle_hessian(*state, std::span<const Real>(h), stride, ++version);
+        }
+        for (std::size_t r = 0; r < rows; ++r)
+            t[r] = hidden[r] != 0 ? Real(0) : static_cast<Real>(-data.targets[f][r]);
+        combine_rows(basis.data(), stride, t.data(), rows, padded(shapes), nullptr, q.data());
+        const BoxQpReport report = solve_box_qp({shapes, stride, h, q, low, top, version}, {}, *state,
+                                                *workspace, std::span<Real>(w));
+        for (const Real x : w) digest.add(x);
+        digest.add(report.kkt);
+        digest.add(report.objective);
+        digest.add(report.iterations);
+    }
+}
+
+}  // namespace
+
+int main() {
+    if (!supported()) {
+        std::puts("unsupported");
+        return 0;
+    }
+    test::Digest digest;
+    run<float>(150, 46, 3e-3, 1.0, digest);
+    run<float>(150, 140, 3e-3, 1.0, digest);
+    run<double>(66, 12, 1e-6, 1e6, digest);
+    run<double>(150, 46, 0.0, 1e6, digest);
+    std::printf("%016llx\n", static_cast<unsigned long long>(digest.value()));
+    return 0;
+}
