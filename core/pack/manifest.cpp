@@ -75,7 +75,7 @@ Result<void, PackError> read_identity(const fb::Manifest& stored, PackManifest& 
     out.security_counter = stored.security_counter();
     out.solver_abi_min = stored.solver_abi_min();
     out.solver_abi_max = stored.solver_abi_max();
-    if (out.solver_abi_min > kSolverAbi || out.solver_abi_max < kSolverAbi)
+    if (out.solver_abi_min > kSolverAbi || out.solver_abi_max < kOldestSolverAbi)
         return failure(PackError::kSolverVersion);
     if (stored.boards() != nullptr) {
         for (const flatbuffers::String* board : *stored.boards()) {
@@ -114,6 +114,12 @@ Result<void, PackError> read_counts(const fb::Manifest& stored, PackManifest& ou
     out.noise_mm = stored.noise_mm();
     out.sparsity_mm2 = stored.sparsity_mm2();
     out.ridge_mm2 = stored.ridge_mm2();
+    if (stored.rbf_kernel() >
+        static_cast<std::uint8_t>(rbf ? RbfKernel::kMultiquadric : RbfKernel::kGaussian))
+        return failure(PackError::kRbfKernel);
+    out.rbf_kernel = static_cast<RbfKernel>(stored.rbf_kernel());
+    out.rbf_hull_near_widths = stored.rbf_hull_near_widths();
+    out.rbf_hull_far_widths = stored.rbf_hull_far_widths();
     if (stored.cameras() != nullptr) {
         for (const fb::Camera* camera : *stored.cameras()) {
             if (!out.cameras.push_back(camera_from(*camera))) return failure(PackError::kCameraCount);

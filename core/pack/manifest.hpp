@@ -42,6 +42,9 @@ struct PackManifest {
     float noise_mm = 0.0F;
     float sparsity_mm2 = 0.0F;
     float ridge_mm2 = 0.0F;
+    RbfKernel rbf_kernel = RbfKernel::kGaussian;
+    float rbf_hull_near_widths = 0.0F;
+    float rbf_hull_far_widths = 0.0F;
     BoundedVector<CameraModel, kMaxCameras> cameras;
     BoundedVector<PackSection, kSectionTypeCount> sections;  // in file order
 };

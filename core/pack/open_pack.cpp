@@ -16,6 +16,7 @@ constexpr double kMinSigma = 1e-6;
 constexpr double kMaxEnergyMm2 = 1e9;
 constexpr double kMaxRbf = 1e6;
 constexpr double kMinWidthMm = 1e-3;
+constexpr double kMaxHullWidths = 1e3;
 constexpr double kOrthonormalTolerance = 1e-3;  // rows stored as float32; a wrong basis misses by far more
 constexpr double kRotationTolerance = 1e-4;     // calibration files print six digits and more
 
@@ -80,6 +81,11 @@ Result<void, PackError> check_scalars(const PackManifest& manifest) {
         !inside(manifest.ridge_mm2, 0.0, kMaxEnergyMm2)) {
         return failure(PackError::kRegularisation);
     }
+    const bool off = manifest.rbf_hull_near_widths == 0.0F && manifest.rbf_hull_far_widths == 0.0F;
+    const bool ordered = inside(manifest.rbf_hull_near_widths, 0.0, kMaxHullWidths) &&
+                         inside(manifest.rbf_hull_far_widths, 0.0, kMaxHullWidths) &&
+                         manifest.rbf_hull_near_widths < manifest.rbf_hull_far_widths;
+    if (!off && (!ordered || manifest.solver != SolverKind::kRbf)) return failure(PackError::kRbfHull);
     return {};
 }
 
@@ -226,6 +232,9 @@ void copy_scalars(const PackManifest& manifest, SolvePack& pack) {
     pack.noise_mm = manifest.noise_mm;
     pack.sparsity_mm2 = manifest.sparsity_mm2;
     pack.ridge_mm2 = manifest.ridge_mm2;
+    pack.rbf.kernel = manifest.rbf_kernel;
+    pack.rbf.hull_near_widths = manifest.rbf_hull_near_widths;
+    pack.rbf.hull_far_widths = manifest.rbf_hull_far_widths;
     pack.rbf.dimension_count = static_cast<std::uint16_t>(manifest.counts.rbf_dimensions);
     pack.rbf.centre_count = static_cast<std::uint16_t>(manifest.counts.rbf_centres);
     pack.camera_count = static_cast<std::uint8_t>(manifest.cameras.size());

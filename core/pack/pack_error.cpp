@@ -92,6 +92,10 @@ std::string_view pack_error_text(PackError error) {
             return "an RBF width is not positive";
         case PackError::kRbfBasis:
             return "the rows of its RBF basis are not orthonormal";
+        case PackError::kRbfKernel:
+            return "its RBF kernel is unknown, or it has one without being an RBF";
+        case PackError::kRbfHull:
+            return "its RBF fallback distances are not 0 <= near < far, or it is no RBF";
         case PackError::kRegionTable:
             return "a region has an unknown solver or more markers or examples than there can be";
         case PackError::kRegionMarkers:

@@ -54,6 +54,8 @@ enum class PackError : std::uint8_t {
     kNameTwice,
     kRbfWidths,
     kRbfBasis,
+    kRbfKernel,
+    kRbfHull,
     kRegionTable,
     kRegionMarkers,
     kRegionMarkerBlend,

@@ -26,9 +26,26 @@ inline constexpr SolverKind kLastSolverKind = SolverKind::kExamples;
     return solver == SolverKind::kKeyShapes || solver == SolverKind::kExamples;
 }
 
-// Gaussian RBF regression [Deng06 eq. 3-6]: x = basis (t - mean); h_k = exp(-|x - c_k|^2 / (2 width_k^2));
+// phi of u = |x - c_k|^2 / width_k^2, the squared distance in widths:
+//   Gaussian       exp(-u / 2)          the source's [Deng06 eq. 4]
+//   thin plate     1/2 u ln u           = r^2 ln r with r in widths; 0 at the centre
+//   multiquadric   sqrt(1 + u)
+enum class RbfKernel : std::uint8_t { kGaussian = 0, kThinPlate = 1, kMultiquadric = 2 };
+
+[[nodiscard]] constexpr std::string_view rbf_kernel_name(RbfKernel kernel) {
+    constexpr std::array<std::string_view, 3> kNames{"gaussian", "thin-plate", "multiquadric"};
+    const auto at = static_cast<std::size_t>(kernel);
+    return at < kNames.size() ? kNames[at] : "unknown";
+}
+
+// RBF regression [Deng06 eq. 3-6]: x = basis (t - mean); h_k = phi(|x - c_k|^2 / width_k^2);
 // w = weights^T h + offset.
 struct RbfModel {
+    RbfKernel kernel = RbfKernel::kGaussian;
+    // Between these distances to the nearest centre, in its widths, the answer goes over from the
+    // regression's to the box QP's. Both 0: the regression alone.
+    float hull_near_widths = 0.0F;
+    float hull_far_widths = 0.0F;       // > near, or 0
     std::uint16_t dimension_count = 0;  // d
     std::uint16_t centre_count = 0;     // K
     std::span<const float> mean_mm;     // [3m]

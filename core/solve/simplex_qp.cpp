@@ -99,11 +99,8 @@ void FaceWalk<kWidth>::run() {
     if (!adopt_rows()) return;
     if (!s_.warm) start_cold();
     if (!s_.has_inverse || s_.changes_since_rebuild > kChangesBeforeRebuild) rebuild();
-    if (s_.has_inverse && exchange()) {
-        certify();
-    } else {
-        walk();
-    }
+    if (s_.has_inverse && exchange()) certify();
+    if (!report_.optimal) walk();
 }
 
 // Which rows count, and G^T V g. The usual frame has every row and is read in place. False: no row is seen,

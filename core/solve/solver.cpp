@@ -143,18 +143,28 @@ void run_controlled(const SolverConfig& config, const NormalState<double>* norma
     }
 }
 
+// w.rbf_weights: what the references say; report.hull_share: how far the face is from them.
 void run_rbf(const SolverConfig& config, const InferenceOutput& completed, SolverWorkspace& w,
-             SolverOutput& output, SolverReport& report) {
+             SolverReport& report) {
     for (std::size_t k = 0; k < config.pack.marker_count; ++k) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
             w.flat_mm[3 * k + axis] =
                 static_cast<float>(completed.position_mm[k][static_cast<Eigen::Index>(axis)]);
         }
     }
-    const RbfReport rbf = evaluate_rbf(config.pack, {w.flat_mm.data(), 3U * config.pack.marker_count}, w.rbf,
-                                       {output.weights.data(), config.pack.shape_count});
+    const RbfReport rbf = evaluate_rbf(config.rbf, {w.flat_mm.data(), config.rbf.rows}, w.rbf,
+                                       {w.rbf_weights.data(), config.pack.shape_count});
     report.optimal = true;
-    report.hull_distance = rbf.nearest_widths;
+    report.hull_distance = static_cast<double>(rbf.nearest_widths);
+    report.hull_share = static_cast<double>(rbf.hull_share);
+}
+
+// w = (1 - a) w_rbf + a w_qp, a rising smoothly with the distance from the references [ours; methods.md 3.2].
+void blend_rbf(std::span<const float> references, double share, SolverOutput& output) {
+    for (std::size_t i = 0; i < references.size(); ++i) {
+        const auto reference = static_cast<double>(references[i]);
+        output.weights[i] = share > 0.0 ? reference + share * (output.weights[i] - reference) : reference;
+    }
 }
 
 void run_regional(const SolverConfig& config, SolverState& state, SolverWorkspace& w, SolverOutput& output,
@@ -221,23 +231,21 @@ void solve_in(const SolverConfig& config, const NormalTables<Real>& tables, cons
         output.weights = state.previous;
         return;
     }
-    const bool measures = pack.solver == SolverKind::kRbf || is_regional(pack.solver);  // no quadratic in w
-    if (is_regional(pack.solver)) {
-        run_regional(config, state, w, output, report);
-    } else if (measures) {
-        run_rbf(config, completed, w, output, report);
+    const bool is_rbf = pack.solver == SolverKind::kRbf;
+    const bool measures = is_rbf || is_regional(pack.solver);  // no quadratic in w
+    const bool controlled = config.controls.acts_on_problem;   // then Real is double
+    if (is_rbf) run_rbf(config, completed, w, report);
+    if (is_regional(pack.solver)) run_regional(config, state, w, output, report);
+    if (measures ? report.hull_share > 0.0 : !controlled) {
+        run_quadratic(config, pack_problem(config, quadratic.normal, own), state, quadratic.qp, own, output,
+                      report);
     }
-    bool controlled = false;
+    if (is_rbf) blend_rbf({w.rbf_weights.data(), n}, report.hull_share, output);
     if constexpr (sizeof(Real) == sizeof(double)) {
-        controlled = config.controls.acts_on_problem;
         if (controlled) {
             run_controlled(config, measures ? nullptr : &quadratic.normal, input.gamma_scale, state, own,
                            output, report);
         }
-    }
-    if (!controlled && !measures) {
-        run_quadratic(config, pack_problem(config, quadratic.normal, own), state, quadratic.qp, own, output,
-                      report);
     }
     for (std::size_t i = 0; i < n; ++i) {
         if (!is_finite(output.weights[i])) output.weights[i] = state.previous[i];
@@ -261,6 +269,7 @@ void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& wo
     build_regional_tables(pack, config.regional);
     configure_tables(pack, config.tables, workspace);
     configure_tables(pack, config.precise_tables, workspace);
+    if (pack.solver == SolverKind::kRbf) build_rbf_tables(pack, config.rbf);
     weight_confidence(
         {workspace.gram, workspace.gram_diagonal, pack.prior_sigma, static_cast<double>(pack.noise_mm)},
         workspace.confidence, config.full_confidence);

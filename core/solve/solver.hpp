@@ -55,6 +55,7 @@ struct SolverConfig {
     RegionalTables regional;   // of a regional pack
     double ridge_share = 0.0;  // ridge and least pull, relative to the mean diagonal of B^T B
     double pull_share = 0.0;
+    RbfTables rbf;  // of an RBF pack; its hull_share asks for the quadratic
     BoxQpConfig qp;
     BoxQpConfig precise_qp{.tolerance = 1e-9};
     Controls controls;  // neutral after configure_solver(); may be prepared anew between frames
@@ -81,6 +82,7 @@ struct SolverWorkspace {
     QuadraticWorkspace<float> quadratic;
     QuadraticWorkspace<double> precise;
     RbfWorkspace rbf;
+    std::array<float, kMaxShapes> rbf_weights{};
     RegionalWorkspace regional;
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> weights{};
@@ -106,6 +108,9 @@ struct SolverReport {
     std::uint16_t markers_used = 0;
     double residual_rms_mm = 0.0;
     double hull_distance = 0.0;  // RBF: distance to the nearest centre, in that centre's widths
+    // RBF: share of the box QP in the answer, 0 unless the pack has a fallback. Where it is not 0, the
+    // certificate (optimal, kkt, objective, iterations) is the QP's, at its own answer.
+    double hull_share = 0.0;
 };
 
 // Not for frames: the workspace is only scratch here.

@@ -217,8 +217,14 @@ void add_keyshapes_verb(CLI::App& app, int& exit_code) {
         ->required()
         ->type_name("DIR");
     verb->footer(
-        "Example:\n  headrig keyshapes --rig sample --take sample/take.csv --method spread --count 12 --out "
-        "keys");
+        "Prints the error of every method against the number of key shapes, and writes it with a picture.\n"
+        "Examples:\n"
+        "  headrig keyshapes --rig sample --take sample/take.csv --out keys\n"
+        "  headrig keyshapes --rig R --layout 102 --take T.csv --region lips --axes xy --method spread "
+        "--count 16 "
+        "--out keys\n"
+        "Exit codes: 0 done, 2 wrong command line, 3 the data are missing or malformed, 4 nothing could be "
+        "written.");
     verb->callback([command, &exit_code] { exit_code = run_key_shapes(*command); });
 }
 

@@ -136,7 +136,9 @@ json pack_json(const OpenedPack& opened) {
                 {"sparsity_mm2", pack.sparsity_mm2},
                 {"ridge_mm2", pack.ridge_mm2},
                 {"rbf_dimensions", pack.rbf.dimension_count},
-                {"rbf_centres", pack.rbf.centre_count}};
+                {"rbf_centres", pack.rbf.centre_count},
+                {"rbf_kernel", rbf_kernel_name(pack.rbf.kernel)},
+                {"rbf_hull_widths", {pack.rbf.hull_near_widths, pack.rbf.hull_far_widths}}};
     for (const char* list : {"boards", "sections", "cameras", "regions", "shapes", "markers"})
         out[list] = json::array();
     for (const std::string_view board : manifest.boards) out["boards"].push_back(board);
@@ -178,8 +180,12 @@ void print_identity(const PackInfoCommand& command, const OpenedPack& opened) {
     fmt::print("shapes       {}  sparsity {} mm^2  ridge {} mm^2\n", pack.shape_count, pack.sparsity_mm2,
                pack.ridge_mm2);
     if (pack.solver == SolverKind::kRbf) {
-        fmt::print("rbf          {} centres in {} dimensions\n", pack.rbf.centre_count,
-                   pack.rbf.dimension_count);
+        fmt::print("rbf          {} centres in {} dimensions, {} kernel\n", pack.rbf.centre_count,
+                   pack.rbf.dimension_count, rbf_kernel_name(pack.rbf.kernel));
+        if (pack.rbf.hull_far_widths > 0.0F) {
+            fmt::print("             box QP from {} to {} widths from its nearest centre\n",
+                       pack.rbf.hull_near_widths, pack.rbf.hull_far_widths);
+        }
     }
     if (pack.region_count > 0) fmt::print("regions      {}\n", pack.region_count);
     fmt::print("cameras      {}\n", pack.camera_count);

@@ -28,6 +28,7 @@ struct TrainCommand {
     std::string name;
     std::string method = "spread";
     std::vector<std::string> takes;
+    std::vector<double> hull_fallback;  // near, far
     TrainOptions options;
     PackIdentity identity;
 };
@@ -61,10 +62,17 @@ void print_result(const TrainCommand& command, const TrainedPack& pack) {
     if (!pack.report.rbf) return;
     const RbfTrainingReport& rbf = *pack.report.rbf;
     fmt::print(
-        "rbf: {} frames, {} references, {} dimensions ({:.2f} % of the variance), width {} x spacing, lambda "
-        "{:.2g}\n",
-        rbf.frames, rbf.centres, rbf.dimensions, 100.0 * rbf.variance_kept, rbf.width_factor,
-        rbf.median_lambda);
+        "rbf: {} kernel, {} frames, {} references, {} dimensions ({:.2f} % of the variance), width {} x "
+        "spacing, lambda {:.2g}\n",
+        rbf_kernel_name(pack.rbf.kernel), rbf.frames, rbf.centres, rbf.dimensions, 100.0 * rbf.variance_kept,
+        rbf.width_factor, rbf.median_lambda);
+    fmt::print(
+        "rbf: the take's own frames lie {:.2f} widths from their nearest reference, 95 % within {:.2f}\n",
+        rbf.distance_p50, rbf.distance_p95);
+    if (pack.rbf.hull_far_widths > 0.0F) {
+        fmt::print("rbf: goes over to the box QP from {} to {} widths from its nearest reference\n",
+                   pack.rbf.hull_near_widths, pack.rbf.hull_far_widths);
+    }
     fmt::print("rbf weight rms: {:.4f} in the take ({:.4f} over visible shapes), {:.4f} on blocks left out\n",
                rbf.in_take_rms, rbf.visible_in_take_rms, rbf.cross_validated_rms);
 }
@@ -122,6 +130,10 @@ int run_train(TrainCommand& command) {
         return kExitUsage;
     }
     command.options.regional.method = *method;
+    if (!command.hull_fallback.empty()) {
+        command.options.rbf.hull_near_widths = command.hull_fallback.front();
+        command.options.rbf.hull_far_widths = command.hull_fallback.back();
+    }
     if (const std::string fault = fault_of_options(command.options, command.takes.size()); !fault.empty()) {
         print_error(fault);
         return kExitUsage;
@@ -149,6 +161,29 @@ int run_train(TrainCommand& command) {
     print_result(command, *pack);
     print_warnings(*pack);
     return kExitOk;
+}
+
+void add_rbf_options(CLI::App& verb, TrainCommand& command) {
+    RbfTrainingOptions& rbf = command.options.rbf;
+    verb.add_option("--centres", rbf.centres, "reference frames of the rbf")
+        ->capture_default_str()
+        ->type_name("K");
+    verb.add_option("--dimensions", rbf.dimensions, "components of the rbf; 0: by cross-validation")
+        ->capture_default_str()
+        ->type_name("D");
+    const std::map<std::string, RbfKernel> kernels = {{"gaussian", RbfKernel::kGaussian},
+                                                      {"thin-plate", RbfKernel::kThinPlate},
+                                                      {"multiquadric", RbfKernel::kMultiquadric}};
+    verb.add_option("--rbf-kernel", rbf.kernel, "gaussian, thin-plate or multiquadric")
+        ->transform(CLI::CheckedTransformer(kernels, CLI::ignore_case).description(""))
+        ->type_name("NAME")
+        ->default_str("gaussian");
+    verb.add_option("--hull-fallback", command.hull_fallback,
+                    "distances to the nearest reference, in its widths, between which the rbf's answer goes "
+                    "over to the box QP's; this verb says what the take's own frames have [none]")
+        ->delimiter(',')
+        ->expected(2)
+        ->type_name("NEAR,FAR");
 }
 
 }  // namespace
@@ -194,13 +229,7 @@ void add_train_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--ridge", command->options.ridge,
                      fmt::format("weight of sum w^2, in the same units [boxqp: {}]", kDefaultRidge))
         ->type_name("X");
-    verb->add_option("--centres", command->options.rbf.centres, "reference frames of the rbf")
-        ->capture_default_str()
-        ->type_name("K");
-    verb->add_option("--dimensions", command->options.rbf.dimensions,
-                     "components of the rbf; 0: by cross-validation")
-        ->capture_default_str()
-        ->type_name("D");
+    add_rbf_options(*verb, *command);
     verb->add_option("--method", command->method,
                      "choice of key shapes: spread, clusters2, clusters3 or hull")
         ->capture_default_str()

@@ -19,6 +19,7 @@ inline constexpr int kExitInterrupted = 130;
 void add_control_verb(CLI::App& app, int& exit_code);
 void add_demo_verb(CLI::App& app, int& exit_code);
 void add_detect_verb(CLI::App& app, int& exit_code);
+void add_experiment_verb(CLI::App& app, int& exit_code);
 void add_import_verb(CLI::App& app, int& exit_code);
 void add_info_verb(CLI::App& app, int& exit_code);
 void add_keyshapes_verb(CLI::App& app, int& exit_code);

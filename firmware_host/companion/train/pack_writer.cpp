@@ -178,7 +178,10 @@ std::vector<std::byte> manifest_of(const SolvePack& pack, const PackIdentity& id
     manifest.add_name(name);
     manifest.add_pack_version(identity.pack_version);
     manifest.add_security_counter(identity.security_counter);
-    manifest.add_solver_abi_min(kSolverAbi);
+    // An older core would take any kernel for the Gaussian and never fall back.
+    const bool older_core_agrees =
+        pack.rbf.kernel == RbfKernel::kGaussian && pack.rbf.hull_far_widths == 0.0F;
+    manifest.add_solver_abi_min(older_core_agrees ? kOldestSolverAbi : kSolverAbi);
     manifest.add_solver_abi_max(kSolverAbi);
     manifest.add_boards(boards);
     manifest.add_memory_bytes((total + 4095) / 4096 * 4096);  // whole pages of the mapped file
@@ -193,6 +196,9 @@ std::vector<std::byte> manifest_of(const SolvePack& pack, const PackIdentity& id
     manifest.add_ridge_mm2(pack.ridge_mm2);
     manifest.add_cameras(camera_vector);
     manifest.add_sections(section_vector);
+    manifest.add_rbf_kernel(static_cast<std::uint8_t>(pack.rbf.kernel));
+    manifest.add_rbf_hull_near_widths(pack.rbf.hull_near_widths);
+    manifest.add_rbf_hull_far_widths(pack.rbf.hull_far_widths);
     manifest.add_region_count(pack.region_count);
     fb::FinishManifestBuffer(builder, manifest.Finish());
     const auto raw = std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize()));

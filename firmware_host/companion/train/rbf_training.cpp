@@ -9,7 +9,9 @@
 #include <limits>
 #include <numeric>
 
+#include "firmware_host/companion/train/gcv.hpp"
 #include "firmware_host/companion/train/reference_frames.hpp"
+#include "firmware_host/companion/train/white_noise.hpp"
 
 namespace rig::host {
 
@@ -41,26 +43,6 @@ struct Frames {
     MatrixXd seen;          // F x D, with noise: models are judged on these
     VectorXd variance_mm2;  // D
     double total_variance_mm2 = 0.0;
-};
-
-// Repeatable white noise: SplitMix64 and the sum of twelve uniforms.
-class WhiteNoise {
-  public:
-    double next() {
-        double sum = -6.0;
-        for (int i = 0; i < 12; ++i) sum += static_cast<double>(bits() >> 11) * 0x1p-53;
-        return sum;
-    }
-
-  private:
-    std::uint64_t bits() {
-        state_ += 0x9e3779b97f4a7c15ULL;
-        std::uint64_t z = state_;
-        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-        z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-        return z ^ (z >> 31);
-    }
-    std::uint64_t state_ = 20061;
 };
 
 MatrixXd weights_of(std::span<const Take> takes, std::size_t shape_count) {
@@ -103,18 +85,20 @@ void find_axes(const MatrixXd& b, const VectorXd& neutral, double noise_mm, Fram
     }
     frames.clean = centred * (frames.basis * b).transpose();
     frames.seen = frames.clean;
-    WhiteNoise noise;
+    WhiteNoise noise(20061);
     for (Index r = 0; r < frames.seen.rows(); ++r) {
         for (Index c = 0; c < frames.seen.cols(); ++c) frames.seen(r, c) += noise_mm * noise.next();
     }
 }
 
 struct Model {
+    RbfKernel kernel = RbfKernel::kGaussian;
     MatrixXd centres;  // K x d
     VectorXd widths;   // K
     MatrixXd weights;  // K x N
     VectorXd offset;   // N
     double median_lambda = 0.0;
+    std::vector<GcvPath> gcv_paths;  // of each weight
 };
 
 VectorXd local_widths(const MatrixXd& centres, double factor, double least) {
@@ -134,39 +118,70 @@ VectorXd local_widths(const MatrixXd& centres, double factor, double least) {
     return widths;
 }
 
+// phi(u) and its derivative, the same functions as core's (solve_pack.hpp).
+Eigen::ArrayXd kernel_of(RbfKernel kernel, const Eigen::ArrayXd& u) {
+    switch (kernel) {
+        case RbfKernel::kThinPlate:
+            return (u > 0.0).select(0.5 * u * u.max(1e-300).log(), 0.0);
+        case RbfKernel::kMultiquadric:
+            return (1.0 + u).sqrt();
+        case RbfKernel::kGaussian:
+            break;
+    }
+    return (-0.5 * u).exp();
+}
+Eigen::ArrayXd kernel_slope(RbfKernel kernel, const Eigen::ArrayXd& u) {
+    switch (kernel) {
+        case RbfKernel::kThinPlate:
+            return (u > 0.0).select(0.5 * (u.max(1e-300).log() + 1.0),
+                                    0.0);  // at 0 it is multiplied by r = 0
+        case RbfKernel::kMultiquadric:
+            return 0.5 / (1.0 + u).sqrt();
+        case RbfKernel::kGaussian:
+            break;
+    }
+    return -0.5 * (-0.5 * u).exp();
+}
+
+Eigen::ArrayXd squared_in_widths(const MatrixXd& points, const Model& model, Index k) {
+    return (points.rowwise() - model.centres.row(k)).rowwise().squaredNorm().array() /
+           (model.widths[k] * model.widths[k]);
+}
+
 MatrixXd heights(const MatrixXd& points, const Model& model) {
     MatrixXd h(points.rows(), model.centres.rows());
     for (Index k = 0; k < model.centres.rows(); ++k) {
-        const double scale = -0.5 / (model.widths[k] * model.widths[k]);
-        h.col(k) = ((points.rowwise() - model.centres.row(k)).rowwise().squaredNorm() * scale).array().exp();
+        h.col(k) = kernel_of(model.kernel, squared_in_widths(points, model, k));
     }
     return h;
 }
 
-// lambda where the derivative of GCV(lambda) = K |P y|^2 / tr(P)^2 vanishes, by the fixed point of Orr 1996
-// (eq. 22), in the eigenbasis of H H^T: mu eigenvalues, z = U^T y. Never under `least`.
-double gcv_lambda(const VectorXd& mu, const VectorXd& z, double least) {
-    double lambda = std::max(least, 1e-3 * mu.maxCoeff());
-    double previous_gcv = std::numeric_limits<double>::infinity();
-    for (int iteration = 0; iteration < 200; ++iteration) {
-        const Eigen::ArrayXd shrunk = 1.0 / (mu.array() + lambda);
-        const double residual = (lambda * shrunk * z.array()).square().sum();  // y^T P^2 y
-        const double trace = (lambda * shrunk).sum();                          // tr P
-        const double gcv = static_cast<double>(mu.size()) * residual / (trace * trace);
-        if (std::abs(previous_gcv - gcv) <= 1e-6 * gcv) break;
-        previous_gcv = gcv;
-        const double slope = (mu.array() * shrunk.square()).sum();  // tr(A^-1 - lambda A^-2)
-        const double length = (mu.array() * z.array().square() * shrunk.cube()).sum();  // w^T A^-1 w
-        if (!(length > 0.0) || !(trace > 0.0)) break;
-        lambda = std::clamp(residual * slope / (length * trace), least, 1e3 * mu.maxCoeff());
+// Training with noisy inputs is a ridge: the expected square of noise times the slope of the heights
+// [Bishop 1995]. Per mm^2 of noise, mean over the references.
+double squared_slope(const Model& model) {
+    double sum = 0.0;
+    for (Index k = 0; k < model.centres.rows(); ++k) {
+        const Eigen::ArrayXd u = squared_in_widths(model.centres, model, k);
+        // |d phi / d x| = |phi'(u)| 2 r / s^2, r^2 = u s^2
+        sum += (4.0 * kernel_slope(model.kernel, u).square() * u).sum() / (model.widths[k] * model.widths[k]);
     }
-    return lambda;
+    return sum / static_cast<double>(model.centres.rows());
 }
 
-Model fit(const Frames& frames, const std::vector<Index>& references, Index dimensions, double factor,
-          double noise_mm) {
+// What of a model is chosen, not fitted.
+struct Settings {
+    RbfKernel kernel = RbfKernel::kGaussian;
+    Index dimensions = 1;
+    double factor = 2.0;
+    double noise_mm = 0.1;
+};
+
+Model fit(const Frames& frames, const std::vector<Index>& references, const Settings& settings) {
+    const Index dimensions = settings.dimensions;
+    const double noise_mm = settings.noise_mm;
     const auto count = static_cast<Index>(references.size());
     Model model;
+    model.kernel = settings.kernel;
     model.centres.resize(count, dimensions);
     MatrixXd y(count, frames.weights.cols());
     for (Index k = 0; k < count; ++k) {
@@ -175,26 +190,20 @@ Model fit(const Frames& frames, const std::vector<Index>& references, Index dime
     }
     model.offset = y.colwise().mean().transpose();
     y.rowwise() -= model.offset.transpose();
-    model.widths = local_widths(model.centres, factor, std::max(noise_mm, 0.01));
+    model.widths = local_widths(model.centres, settings.factor, std::max(noise_mm, 0.01));
+    // r^2 ln r is one function of the distance; widths that differ would tear it apart.
+    if (settings.kernel == RbfKernel::kThinPlate) model.widths.setConstant(model.widths.mean());
     const MatrixXd h = heights(model.centres, model);
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(h * h.transpose());
     const VectorXd mu = eigen.eigenvalues().cwiseMax(0.0);
     const MatrixXd z = eigen.eigenvectors().transpose() * y;
-    // Training with noisy inputs is a ridge: the expected square of noise times the slope of the heights
-    // [Bishop 1995].
-    double slope = 0.0;
-    for (Index k = 0; k < count; ++k) {
-        const double w2 = model.widths[k] * model.widths[k];
-        const Eigen::ArrayXd gaps2 =
-            (model.centres.rowwise() - model.centres.row(k)).rowwise().squaredNorm().array();
-        slope += (h.col(k).array().square() * gaps2).sum() / (w2 * w2);
-    }
-    const double least = std::max(kLeastRelativeLambda * mu.maxCoeff(),
-                                  noise_mm * noise_mm * slope / static_cast<double>(count));
+    const double least =
+        std::max(kLeastRelativeLambda * mu.maxCoeff(), noise_mm * noise_mm * squared_slope(model));
     MatrixXd shrunk(count, y.cols());
     std::vector<double> lambdas;
     for (Index j = 0; j < y.cols(); ++j) {
-        lambdas.push_back(gcv_lambda(mu, z.col(j), least));
+        model.gcv_paths.push_back(minimise_gcv(mu, z.col(j), least));
+        lambdas.push_back(model.gcv_paths.back().back().lambda);
         shrunk.col(j) = z.col(j).array() / (mu.array() + lambdas.back());
     }
     model.weights = h.transpose() * (eigen.eigenvectors() * shrunk);
@@ -210,8 +219,7 @@ MatrixXd predict(const Model& model, const MatrixXd& points) {
 
 // Mean square error of all weights over blocks of the take, each judged by a model without that block's
 // references.
-double cross_validated(const Frames& frames, const std::vector<Index>& references, Index dimensions,
-                       double factor, double noise_mm) {
+double cross_validated(const Frames& frames, const std::vector<Index>& references, const Settings& settings) {
     const Index total = frames.weights.rows();
     double sum = 0.0;
     double counted = 0.0;
@@ -222,13 +230,13 @@ double cross_validated(const Frames& frames, const std::vector<Index>& reference
         std::ranges::copy_if(references, std::back_inserter(others),
                              [&](Index f) { return f < begin || f >= end; });
         if (others.size() < 2) continue;
-        const Model model = fit(frames, others, dimensions, factor, noise_mm);
+        const Model model = fit(frames, others, settings);
         const Index stride = std::max<Index>(1, (end - begin) / kJudgedPerBlock);
         const Index judged = (end - begin + stride - 1) / stride;
-        MatrixXd points(judged, dimensions);
+        MatrixXd points(judged, settings.dimensions);
         MatrixXd truth(judged, frames.weights.cols());
         for (Index i = 0; i < judged; ++i) {
-            points.row(i) = frames.seen.row(begin + i * stride).head(dimensions);
+            points.row(i) = frames.seen.row(begin + i * stride).head(settings.dimensions);
             truth.row(i) = frames.weights.row(begin + i * stride);
         }
         sum += (predict(model, points) - truth).squaredNorm();
@@ -237,11 +245,11 @@ double cross_validated(const Frames& frames, const std::vector<Index>& reference
     return counted > 0.0 ? sum / counted : std::numeric_limits<double>::infinity();
 }
 
-// What cross-validation chose.
+// What cross-validation chose, and what it saw on the way.
 struct Choice {
-    Index dimensions = 1;
-    double factor = 2.0;
+    Settings settings;
     double mean_square = std::numeric_limits<double>::infinity();
+    std::vector<CrossValidation> tried;
 };
 
 // Widths at a middling number of components, then the components, then the widths again: the two hardly
@@ -249,34 +257,42 @@ struct Choice {
 Choice choose(const Frames& frames, const std::vector<Index>& references, const RbfTrainingOptions& options,
               double noise_mm, const TrainingProgress& progress) {
     const Index most = frames.basis.rows();
+    const Index wanted = options.dimensions > 0 ? static_cast<Index>(options.dimensions) : Index{8};
     Choice best;
-    best.dimensions = options.dimensions > 0 ? std::min<Index>(most, static_cast<Index>(options.dimensions))
-                                             : std::min<Index>(most, 8);
+    best.settings = {options.kernel, std::min(most, wanted), 2.0, noise_mm};
     const double steps = 2.0 * kWidthFactors.size() + kDimensions.size();
-    double done = 0.0;
     const auto consider = [&](Index dimensions, double factor) {
-        const double mean_square = cross_validated(frames, references, dimensions, factor, noise_mm);
-        if (mean_square < best.mean_square) best = {dimensions, factor, mean_square};
-        if (progress) progress(std::min(1.0, ++done / steps));
+        const Settings settings{options.kernel, dimensions, factor, noise_mm};
+        const double mean_square = cross_validated(frames, references, settings);
+        best.tried.push_back({static_cast<std::size_t>(dimensions), factor, std::sqrt(mean_square)});
+        if (mean_square < best.mean_square) {
+            best.settings = settings;
+            best.mean_square = mean_square;
+        }
+        if (progress) progress(std::min(1.0, static_cast<double>(best.tried.size()) / steps));
     };
-    for (const double factor : kWidthFactors) consider(best.dimensions, factor);
+    const Index first_dimensions = best.settings.dimensions;
+    for (const double factor : kWidthFactors) consider(first_dimensions, factor);
     if (options.dimensions > 0) return best;
-    const double first_factor = best.factor;
+    const double first_factor = best.settings.factor;
     for (const Index dimensions : kDimensions) {
         if (dimensions <= most) consider(dimensions, first_factor);
     }
-    const Index chosen = best.dimensions;
+    const Index chosen = best.settings.dimensions;
     for (const double factor : kWidthFactors) consider(chosen, factor);
     return best;
 }
 
-TrainedRbf to_pack(const Frames& frames, const Model& model) {
+TrainedRbf to_pack(const Frames& frames, const Model& model, const RbfTrainingOptions& options) {
     const auto floats = [](const MatrixXd& values) {
         const FloatRows rows = values.cast<float>();
         return std::vector<float>(rows.data(), rows.data() + rows.size());
     };
     const Index d = model.centres.cols();
     TrainedRbf out;
+    out.kernel = model.kernel;
+    out.hull_near_widths = static_cast<float>(options.hull_near_widths);
+    out.hull_far_widths = static_cast<float>(options.hull_far_widths);
     out.dimension_count = static_cast<std::uint16_t>(d);
     out.centre_count = static_cast<std::uint16_t>(model.centres.rows());
     out.mean_mm = floats(frames.mean_mm);
@@ -286,6 +302,15 @@ TrainedRbf to_pack(const Frames& frames, const Model& model) {
     out.weights = floats(model.weights);
     out.offset = floats(model.offset);
     return out;
+}
+
+// Of each point to its nearest centre, in that centre's widths.
+std::vector<double> distances_of(const Model& model, const MatrixXd& points) {
+    Eigen::ArrayXd nearest = squared_in_widths(points, model, 0);
+    for (Index k = 1; k < model.centres.rows(); ++k)
+        nearest = nearest.min(squared_in_widths(points, model, k));
+    const Eigen::ArrayXd distances = nearest.sqrt();
+    return {distances.begin(), distances.end()};
 }
 
 RbfTrainingReport describe(const Frames& frames, const MatrixXd& b, const Model& model,
@@ -304,15 +329,37 @@ RbfTrainingReport describe(const Frames& frames, const MatrixXd& b, const Model&
     report.dimensions = static_cast<std::size_t>(d);
     report.centres = static_cast<std::size_t>(model.centres.rows());
     report.variance_kept = frames.variance_mm2.head(d).sum() / frames.total_variance_mm2;
-    report.width_factor = choice.factor;
+    report.width_factor = choice.settings.factor;
     report.median_lambda = model.median_lambda;
     report.cross_validated_rms = std::sqrt(choice.mean_square);
+    std::vector<double> distances = distances_of(model, frames.seen.leftCols(d));
+    std::ranges::sort(distances);
+    report.distance_p50 = distances[distances.size() / 2];
+    report.distance_p95 = distances[distances.size() * 95 / 100];
+    report.cross_validation = choice.tried;
+    report.gcv_paths = model.gcv_paths;
+    const VectorXd shares = frames.variance_mm2 / frames.total_variance_mm2;
+    report.variance_shares.assign(shares.begin(), shares.end());
     report.in_take_rms = std::sqrt(error.squaredNorm() / static_cast<double>(error.size()));
     report.visible_in_take_rms = visible_count > 0.0 ? std::sqrt(visible / visible_count) : 0.0;
     return report;
 }
 
 }  // namespace
+
+RbfModel view_of(const TrainedRbf& trained) {
+    return {.kernel = trained.kernel,
+            .hull_near_widths = trained.hull_near_widths,
+            .hull_far_widths = trained.hull_far_widths,
+            .dimension_count = trained.dimension_count,
+            .centre_count = trained.centre_count,
+            .mean_mm = trained.mean_mm,
+            .basis = trained.basis,
+            .centres = trained.centres,
+            .widths_mm = trained.widths_mm,
+            .weights = trained.weights,
+            .offset = trained.offset};
+}
 
 Result<RbfTraining, FileError> train_rbf(std::span<const float> neutral_mm, std::span<const float> basis_mm,
                                          std::span<const Take> takes, double noise_mm,
@@ -343,8 +390,8 @@ Result<RbfTraining, FileError> train_rbf(std::span<const float> neutral_mm, std:
     const std::vector<Index> references =
         choose_reference_frames(frames.clean, std::min(options.centres, total / kFramesPerReference));
     const Choice choice = choose(frames, references, options, noise_mm, progress);
-    const Model model = fit(frames, references, choice.dimensions, choice.factor, noise_mm);
-    return RbfTraining{to_pack(frames, model), describe(frames, b, model, choice)};
+    const Model model = fit(frames, references, choice.settings);
+    return RbfTraining{to_pack(frames, model, options), describe(frames, b, model, choice)};
 }
 
 }  // namespace rig::host

@@ -76,7 +76,9 @@ void fill_priors(const TrainOptions& options, TrainedPack& pack) {
     pack.prior_mean = to_floats(statistics.mean);
     pack.prior_sigma = to_floats(statistics.sigma);
 
-    const bool box = options.solver == SolverKind::kBoxQp;
+    // A pack whose regression falls back holds the box QP's numbers too.
+    const bool box = options.solver == SolverKind::kBoxQp ||
+                     (options.solver == SolverKind::kRbf && options.rbf.hull_far_widths > 0.0);
     const bool pull = options.temporal.mode == TemporalPull::Mode::kOn ||
                       (options.temporal.mode == TemporalPull::Mode::kSolversOwn && box);
     pack.temporal_gamma.assign(n, 0.0F);
@@ -102,6 +104,15 @@ std::string fault_of_options(const TrainOptions& options, std::size_t take_count
     }
     if (options.cameras.size() > kMaxCameras)
         return fmt::format("there are more than {} cameras", kMaxCameras);
+    const double near_widths = options.rbf.hull_near_widths;
+    const double far_widths = options.rbf.hull_far_widths;
+    if (near_widths != 0.0 || far_widths != 0.0) {
+        if (options.solver != SolverKind::kRbf) return "only an RBF has references to be far from";
+        if (!within(far_widths, 0.0, 1000.0) || !within(near_widths, 0.0, 1000.0) ||
+            !(near_widths < far_widths)) {
+            return "the fallback's distances are two numbers of widths from 0 to 1000, the near one first";
+        }
+    }
     if (options.solver == SolverKind::kRbf && take_count == 0) {
         return "an RBF learns from a performance: give one with --take T.csv (frame,time_s and one column a "
                "shape), or "
@@ -131,14 +142,7 @@ SolvePack TrainedPack::view() const {
     out.noise_mm = static_cast<float>(noise_mm);
     out.sparsity_mm2 = static_cast<float>(sparsity_mm2);
     out.ridge_mm2 = static_cast<float>(ridge_mm2);
-    out.rbf.dimension_count = rbf.dimension_count;
-    out.rbf.centre_count = rbf.centre_count;
-    out.rbf.mean_mm = rbf.mean_mm;
-    out.rbf.basis = rbf.basis;
-    out.rbf.centres = rbf.centres;
-    out.rbf.widths_mm = rbf.widths_mm;
-    out.rbf.weights = rbf.weights;
-    out.rbf.offset = rbf.offset;
+    out.rbf = view_of(rbf);
     out.region_count = static_cast<std::uint8_t>(std::min(regions.size(), kMaxRegions));
     for (std::size_t r = 0; r < out.region_count; ++r) out.regions[r] = regions[r].view();
     out.camera_count = static_cast<std::uint8_t>(cameras.size());

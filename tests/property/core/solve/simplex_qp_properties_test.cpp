@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -178,6 +179,55 @@ TEST(SimplexQpProperties, AnyBitsEndFiniteAndFeasible) {
             ASSERT_LE(s.report.iterations, SimplexQpConfig{}.iteration_cap);
         }
     }
+}
+
+// Columns as no pack would have them, straight into the solver: repeated, empty, no numbers, too large, too
+// small. Whatever it finds, it ends inside its cap and inside the simplex, with a report of numbers.
+TEST(SimplexQpProperties, BadColumnsEndInsideTheCapAndInsideTheSimplex) {
+    SeededRandom random(25);
+    constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    constexpr std::size_t kRows = 30;
+    struct alignas(64) Lanes {
+        float values[kLaneFloats];
+    };
+    std::array<int, 7> kinds{};
+    for (int round = 0; round < 4000; ++round) {
+        const std::size_t count = 1 + random.below(kMaxRegionShapes);
+        const std::size_t stride = padded(count);
+        std::vector<Lanes> examples(kRows * stride / kLaneFloats), gram(count * stride / kLaneFloats);
+        float* const g = examples.data()->values;
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::size_t kind = random.chance(0.6) ? 0 : random.below(kinds.size());
+            const std::size_t other = random.below(i + 1);
+            ++kinds[kind];
+            for (std::size_t r = 0; r < kRows; ++r) {
+                const auto plain = static_cast<float>(random.normal(0.0, 5.0));
+                const std::array<float, 7> choice{
+                    plain,         g[r * stride + other], 0.0F, kNan, plain > 0.0F ? kInfinity : -kInfinity,
+                    1e25F * plain, 1e-42F * plain};
+                g[r * stride + i] = choice[kind];
+            }
+        }
+        build_simplex_gram({g, kRows * stride}, kRows, count, {}, {gram.data()->values, count * stride});
+        std::vector<float> target(kRows);
+        SimplexQpProblem problem{
+            kRows, count, stride, {g, kRows * stride}, {gram.data()->values, count * stride}, target, {}, 0};
+        SimplexQpState state;
+        static SimplexQpWorkspace workspace;
+        std::vector<float> c(count, -1.0F);
+        for (int frame = 0; frame < 3; ++frame) {
+            for (float& x : target) {
+                x = static_cast<float>(random.normal(0.0, 5.0));
+                if (random.chance(0.05)) x = kNan;
+            }
+            const SimplexQpReport report = solve_simplex_qp(problem, {}, state, workspace, c);
+            expect_feasible(c);
+            ASSERT_LE(report.iterations, SimplexQpConfig{}.iteration_cap) << round;
+            ASSERT_FALSE(report.optimal && !(report.kkt <= 1e6F)) << round << " a certificate of no number";
+        }
+    }
+    for (const int seen : kinds) EXPECT_GT(seen, 1000);
 }
 
 }  // namespace

@@ -281,7 +281,37 @@ TEST(ReadManifest, RefusesCountsAndVersionsOutsideTheLimits) {
     EXPECT_EQ(error_with(M::VT_MEMORY_BYTES, std::uint64_t{kMaxPackBytes + 1}), PackError::kMemory);
     EXPECT_EQ(error_with(M::VT_MEMORY_BYTES, ~std::uint64_t{0}), PackError::kMemory);
     EXPECT_EQ(error_with(M::VT_SOLVER_ABI_MIN, u16(kSolverAbi + 1)), PackError::kSolverVersion);
-    EXPECT_EQ(error_with(M::VT_SOLVER_ABI_MAX, u16(kSolverAbi - 1)), PackError::kSolverVersion);
+    EXPECT_EQ(error_with(M::VT_SOLVER_ABI_MAX, u16(kOldestSolverAbi - 1)), PackError::kSolverVersion);
+}
+
+TEST(ReadManifest, RefusesKernelsAndFallbacksThatMeanNothing) {
+    using M = fb::Manifest;
+    const auto u8 = [](std::size_t value) { return static_cast<std::uint8_t>(value); };
+    EXPECT_EQ(error_with(M::VT_RBF_KERNEL, u8(1)), PackError::kRbfKernel) << "a box QP has no kernel";
+    EXPECT_EQ(error_with(M::VT_RBF_KERNEL, u8(3), SolverKind::kRbf), PackError::kRbfKernel);
+    EXPECT_EQ(error_with(M::VT_RBF_HULL_FAR_WIDTHS, 2.0F), PackError::kRbfHull);
+    for (const float bad :
+         {-1.0F, 1001.0F, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+        EXPECT_EQ(error_with(M::VT_RBF_HULL_FAR_WIDTHS, bad, SolverKind::kRbf), PackError::kRbfHull);
+        EXPECT_EQ(error_with(M::VT_RBF_HULL_NEAR_WIDTHS, bad, SolverKind::kRbf), PackError::kRbfHull);
+    }
+    EXPECT_EQ(error_with(M::VT_RBF_HULL_NEAR_WIDTHS, 2.0F, SolverKind::kRbf), PackError::kRbfHull)
+        << "near beyond far";
+}
+
+TEST(ReadManifest, AsksForTheNewSolverInterfaceOnlyWhereItMatters) {
+    SamplePack sample({.solver = SolverKind::kRbf});
+    const auto oldest = [&] {
+        const AlignedBytes bytes(write_pack(sample.view, {}, sha256));
+        const auto manifest = read_manifest(bytes.span(), sha256);
+        return manifest ? manifest->solver_abi_min : std::uint16_t{0};
+    };
+    EXPECT_EQ(oldest(), kOldestSolverAbi);
+    sample.view.rbf.kernel = RbfKernel::kMultiquadric;
+    EXPECT_EQ(oldest(), kSolverAbi);
+    sample.view.rbf.kernel = RbfKernel::kGaussian;
+    sample.view.rbf.hull_far_widths = 2.0F;
+    EXPECT_EQ(oldest(), kSolverAbi);
 }
 
 TEST(ReadManifest, RefusesSectionsThatBelongToAnotherSolver) {

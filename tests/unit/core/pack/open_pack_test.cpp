@@ -74,6 +74,21 @@ TEST(OpenPack, GivesBackWhatWasWritten) {
     }
 }
 
+TEST(OpenPack, GivesBackKernelAndFallback) {
+    for (const RbfKernel kernel : {RbfKernel::kGaussian, RbfKernel::kThinPlate, RbfKernel::kMultiquadric}) {
+        SamplePack sample({.solver = SolverKind::kRbf});
+        sample.view.rbf.kernel = kernel;
+        sample.view.rbf.hull_near_widths = 1.5F;
+        sample.view.rbf.hull_far_widths = 3.0F;
+        const AlignedBytes bytes(write_pack(sample.view, {}, sha256));
+        const auto opened = open_pack(bytes.span(), sha256);
+        ASSERT_TRUE(opened.has_value()) << pack_error_text(opened.error());
+        EXPECT_EQ(opened->rbf.kernel, kernel);
+        EXPECT_EQ(opened->rbf.hull_near_widths, 1.5F);
+        EXPECT_EQ(opened->rbf.hull_far_widths, 3.0F);
+    }
+}
+
 TEST(OpenPack, TakesTheLargestCounts) {
     const SamplePack sample({.markers = kMaxMarkers,
                              .shapes = kMaxShapes,

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "core/solve/rbf.hpp"
 #include "firmware_host/companion/train/train.hpp"
@@ -28,8 +30,10 @@ Result<TrainedPack, FileError> train_tiny(const TinyRig& tiny, const RbfTraining
 // that training assumes, but not the same noise.
 double core_rms(const SolvePack& pack, const Take& take) {
     test::SeededRandom random(31);
+    const auto tables = std::make_unique<RbfTables>();
+    build_rbf_tables(pack, *tables);
     RbfWorkspace workspace;
-    std::vector<double> weights(pack.shape_count);
+    std::vector<float> weights(pack.shape_count);
     std::vector<float> t(pack.neutral_mm.size());
     double sum = 0.0;
     for (std::size_t f = 0; f < take.frame_count; ++f) {
@@ -39,9 +43,9 @@ double core_rms(const SolvePack& pack, const Take& take) {
             for (std::size_t i = 0; i < pack.shape_count; ++i)
                 t[r] += pack.basis_mm[r * pack.shape_count + i] * truth[i];
         }
-        static_cast<void>(evaluate_rbf(pack, t, workspace, weights));
+        static_cast<void>(evaluate_rbf(*tables, t, workspace, weights));
         for (std::size_t i = 0; i < weights.size(); ++i) {
-            const double error = weights[i] - static_cast<double>(truth[i]);
+            const double error = static_cast<double>(weights[i] - truth[i]);
             sum += error * error;
         }
     }
@@ -63,6 +67,63 @@ TEST(TrainRbf, LearnsATakeAndCoreEvaluatesTheSame) {
     EXPECT_GT(report.in_take_rms, 0.001);
     EXPECT_LT(report.in_take_rms, report.cross_validated_rms);
     EXPECT_NEAR(core_rms(pack->view(), tiny.take), report.in_take_rms, 0.1 * report.in_take_rms);
+}
+
+TEST(TrainRbf, EveryKernelLearnsATakeAndCoreEvaluatesTheSame) {
+    const TinyRig tiny = tiny_rig(24, 4, 600);
+    for (const RbfKernel kernel : {RbfKernel::kThinPlate, RbfKernel::kMultiquadric}) {
+        const auto pack = train_tiny(tiny, {.centres = 60, .kernel = kernel});
+        ASSERT_TRUE(pack.has_value()) << pack.error().message;
+        EXPECT_EQ(pack->rbf.kernel, kernel);
+        const RbfTrainingReport& report = *pack->report.rbf;
+        EXPECT_LT(report.in_take_rms, 0.1) << rbf_kernel_name(kernel);
+        EXPECT_GT(report.in_take_rms, 0.001);
+        EXPECT_NEAR(core_rms(pack->view(), tiny.take), report.in_take_rms, 0.1 * report.in_take_rms)
+            << rbf_kernel_name(kernel);
+    }
+}
+
+TEST(TrainRbf, KeepsWhatItTriedAndHowLambdaWasFound) {
+    const TinyRig tiny = tiny_rig(24, 4, 600);
+    const auto pack = train_tiny(tiny, {.centres = 60});
+    ASSERT_TRUE(pack.has_value()) << pack.error().message;
+    const RbfTrainingReport& report = *pack->report.rbf;
+    double best = 1e9;
+    for (const CrossValidation& tried : report.cross_validation) best = std::min(best, tried.weight_rms);
+    EXPECT_GE(report.cross_validation.size(), 14U + 3U) << "widths twice and at least three dimensions";
+    EXPECT_DOUBLE_EQ(best, report.cross_validated_rms);
+    EXPECT_GT(report.distance_p50, 0.0);
+    EXPECT_LT(report.distance_p50, report.distance_p95);
+    EXPECT_LT(report.distance_p95, 2.0) << "references are taken from the take";
+    ASSERT_EQ(report.gcv_paths.size(), 4U);
+    for (const GcvPath& path : report.gcv_paths) {
+        ASSERT_GE(path.size(), 1U);
+        EXPECT_LE(path.back().gcv, path.front().gcv);
+        EXPECT_GT(path.back().lambda, 0.0);
+    }
+    double kept = 0.0;
+    for (std::size_t a = 0; a < report.dimensions; ++a) kept += report.variance_shares[a];
+    EXPECT_DOUBLE_EQ(kept, report.variance_kept);
+}
+
+TEST(TrainRbf, AFallbackBringsTheBoxQpsNumbers) {
+    const TinyRig tiny = tiny_rig(20, 3, 400);
+    const auto plain = train_tiny(tiny, {.centres = 20});
+    const auto falling = train_tiny(tiny, {.centres = 20, .hull_near_widths = 1.5, .hull_far_widths = 3.0});
+    ASSERT_TRUE(plain.has_value() && falling.has_value());
+    EXPECT_EQ(plain->ridge_mm2, 0.0);
+    EXPECT_EQ(plain->view().rbf.hull_far_widths, 0.0F);
+    EXPECT_GT(falling->ridge_mm2, 0.0);
+    EXPECT_GT(falling->sparsity_mm2, 0.0);
+    EXPECT_GT(falling->temporal_gamma[0], 0.0F);
+    EXPECT_EQ(falling->view().rbf.hull_near_widths, 1.5F);
+    EXPECT_EQ(falling->view().rbf.hull_far_widths, 3.0F);
+    for (const auto& [near, far] : {std::pair{3.0, 1.5}, std::pair{-1.0, 2.0}, std::pair{2.0, 2.0},
+                                    std::pair{0.0, 1e4}, std::pair{0.0, std::nan("")}}) {
+        EXPECT_FALSE(
+            train_tiny(tiny, {.centres = 20, .hull_near_widths = near, .hull_far_widths = far}).has_value())
+            << near << " " << far;
+    }
 }
 
 TEST(TrainRbf, IsDeterministic) {

@@ -1,0 +1,37 @@
+#include <algorithm>
+#include <array>
+
+#include "firmware_host/companion/experiments/experiment.hpp"
+
+namespace rig::host {
+
+std::span<const Experiment> all_experiments() {
+    static constexpr std::array kExperiments{
+        Experiment{"chuang02-key-shapes", "Chuang02 Fig. 6: error against the number of key shapes",
+                   chuang02_key_shapes},
+        Experiment{"chuang02-non-negative", "Chuang02 Figs. 4-5: why weights are not negative",
+                   chuang02_non_negative},
+        Experiment{"deng06-mistracked", "Deng06 Fig. 7: two badly tracked markers", deng06_mistracked},
+        Experiment{"deng06-proportions", "Deng06 Fig. 6: RBF against equation solving, other proportions",
+                   deng06_proportions},
+        Experiment{"deng06-variance", "Deng06 section 5: 90.21 % of the variance in four components",
+                   deng06_variance},
+        Experiment{"rbf-dimensions", "Deng06 section 8: how many components, in the take and across takes",
+                   rbf_dimensions},
+        Experiment{"zhang06-regions", "Zhang06 section 5.3: small regions against the whole face",
+                   zhang06_regions},
+    };
+    return kExperiments;
+}
+
+const Experiment* find_experiment(std::string_view name) {
+    const auto all = all_experiments();
+    const auto found = std::ranges::find(all, name, &Experiment::name);
+    return found == all.end() ? nullptr : &*found;
+}
+
+bool all_bounds_hold(const ExperimentTable& table) {
+    return std::ranges::all_of(table.bounds, &ExperimentBound::holds);
+}
+
+}  // namespace rig::host
