@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/base/check.hpp"
+#include "core/base/float_kernels.hpp"
 
 namespace rig {
 
@@ -125,17 +126,24 @@ void solve_lower_transposed(const double* l, std::size_t n, std::size_t stride, 
     }
 }
 
-void inverse_diagonal(const double* l, std::size_t n, std::size_t stride, double* diagonal, double* scratch) {
-    // Entry i of the diagonal is the squared length of column i of L^-1.
-    for (std::size_t column = 0; column < n; ++column) {
-        double sum = 0.0;
-        for (std::size_t i = column; i < n; ++i) {
-            const double unit = i == column ? 1.0 : 0.0;
-            scratch[i] =
-                (unit - dot(l + i * stride + column, scratch + column, i - column)) / l[i * stride + i];
-            sum += scratch[i] * scratch[i];
-        }
-        diagonal[column] = sum;
+void symmetric_inverse(const double* l, std::size_t n, std::size_t stride, double* inverse, double* scratch) {
+    RIG_CHECK(stride >= padded(n) && l != inverse);
+    // M = L^-1 row by row, each from the rows above it.
+    for (std::size_t i = 0; i < n; ++i) {
+        double* row = inverse + i * stride;
+        const double scale = 1.0 / l[i * stride + i];
+        for (std::size_t j = 0; j < i; ++j) scratch[j] = -scale * l[i * stride + j];
+        for (std::size_t j = 0; j < padded(n); ++j) row[j] = 0.0;
+        combine_rows(inverse, stride, scratch, i, padded(i), nullptr, row);
+        row[i] = scale;
+    }
+    // M^T M: row i needs the rows from i on only, so it can take the place of M's.
+    for (std::size_t i = 0; i < n; ++i) {
+        double* row = inverse + i * stride;
+        for (std::size_t k = i + 1; k < n; ++k) scratch[k] = inverse[k * stride + i];
+        const double own = row[i];
+        for (std::size_t j = 0; j <= i; ++j) row[j] *= own;
+        combine_rows(inverse + (i + 1) * stride, stride, scratch + i + 1, n - i - 1, padded(n), row, row);
     }
 }
 

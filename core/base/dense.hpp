@@ -23,8 +23,9 @@ void add_scaled(double* y, double alpha, const double* x, std::size_t n);
 void solve_lower(const double* l, std::size_t n, std::size_t stride, double* x);
 void solve_lower_transposed(const double* l, std::size_t n, std::size_t stride, double* x);
 
-// Diagonal of (L L^T)^-1 into diagonal[n]; `scratch` holds n doubles.
-void inverse_diagonal(const double* l, std::size_t n, std::size_t stride, double* diagonal, double* scratch);
+// (L L^T)^-1 into `inverse`, whole and symmetric, rows `stride` apart and zero behind column n. l is not
+// `inverse`; stride is at least padded(n) (float_kernels.hpp); scratch holds n doubles. n^3 / 2 operations.
+void symmetric_inverse(const double* l, std::size_t n, std::size_t stride, double* inverse, double* scratch);
 
 // Eigenvalues (falling) and eigenvectors (column j of `vectors` belongs to values[j]) of the symmetric n x n
 // matrix `a`, which is destroyed. Cyclic Jacobi, at most 30 sweeps. For set-up, not for frames: about 10 n^3

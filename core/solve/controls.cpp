@@ -100,8 +100,10 @@ void prepare_shape(const SolvePack& pack, const ShapeControls& shape, std::size_
     const double s2 = static_cast<double>(pack.noise_mm) * static_cast<double>(pack.noise_mm);
     const auto sigma = static_cast<double>(pack.prior_sigma[i]);
     const double tikhonov = s2 / (sigma * sigma);
+    const bool one_sided = pack.weight_low[i] >= 0.0F;
     controls.sparsity_mm2[i] =
-        added(shape.sparsity, static_cast<double>(pack.sparsity_mm2), kLaplaceUnit * s2 / sigma);
+        one_sided ? added(shape.sparsity, static_cast<double>(pack.sparsity_mm2), kLaplaceUnit * s2 / sigma)
+                  : 0.0;
     controls.ridge_mm2[i] = added(shape.ridge, static_cast<double>(pack.ridge_mm2), tikhonov);
     controls.temporal_mm2[i] = added(shape.temporal, static_cast<double>(pack.temporal_gamma[i]),
                                      kStepsPerSpread * kStepsPerSpread * tikhonov);

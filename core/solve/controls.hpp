@@ -7,6 +7,7 @@
 //   w_r)^2
 //
 //   beta_i  = (f - 1) beta   where the pack has a beta, else max(0, f - 1) 2 sqrt(2) s^2 / sigma_i
+//             0 for shapes whose range goes below 0, as in E
 //   eps_i   = (f - 1) eps    where the pack has an eps, else max(0, f - 1) s^2 / sigma_i^2
 //   gamma_i = (f - 1) gamma  where the shape has one, else max(0, f - 1) 100 s^2 / sigma_i^2
 //   s_lr    = strength (|b_l|^2 + |b_r|^2) / 2

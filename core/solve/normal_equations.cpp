@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/check.hpp"
+#include "core/solve/square_terms.hpp"
 
 namespace rig {
 
@@ -13,7 +14,6 @@ constexpr std::uint16_t kMostFollowed =
     192;                                 // rank-one terms before H is made anew: 64 markers hidden or shown
 constexpr double kDiagonalFloor = 1e-9;  // of the largest diagonal entry
 constexpr double kSmallestDiagonal = 1e-12;  // mm^2, when the basis is zero
-constexpr double kLeastPivot = 1e-9;  // of the trace; a smaller pivot of a 3 x 3 change carries nothing
 
 bool unseen(const Mat3& v) {
     return v(0, 0) == 0.0 && v(1, 1) == 0.0 && v(2, 2) == 0.0;
@@ -27,32 +27,6 @@ bool same_weight(const Mat3& now, const Mat3& used) {
 Vec3 neutral(const SolvePack& pack, std::size_t k) {
     return {static_cast<double>(pack.neutral_mm[3 * k]), static_cast<double>(pack.neutral_mm[3 * k + 1]),
             static_cast<double>(pack.neutral_mm[3 * k + 2])};
-}
-
-// A symmetric 3 x 3 matrix as sum_j sign_j l_j l_j^T (its L D L^T). False when a pivot is too small to divide
-// by while its column is not.
-struct SquareTerms {
-    std::array<Vec3, 3> l{};
-    std::array<double, 3> sign{};  // -1, 0 or +1
-};
-
-bool square_terms(Mat3 a, SquareTerms& terms) {
-    const double size = a.cwiseAbs().sum();
-    for (Eigen::Index j = 0; j < 3; ++j) {
-        const double pivot = a(j, j);
-        Vec3 column = a.col(j);
-        for (Eigen::Index i = 0; i < j; ++i) column[i] = 0.0;
-        terms.sign[static_cast<std::size_t>(j)] = 0.0;
-        if (std::fabs(pivot) <= kLeastPivot * size) {
-            column[j] = 0.0;
-            if (column.cwiseAbs().maxCoeff() > kLeastPivot * size) return false;
-            continue;
-        }
-        terms.sign[static_cast<std::size_t>(j)] = pivot > 0.0 ? 1.0 : -1.0;
-        terms.l[static_cast<std::size_t>(j)] = column / std::sqrt(std::fabs(pivot));
-        a -= column * column.transpose() / pivot;
-    }
-    return true;
 }
 
 template <typename Real>
@@ -136,28 +110,10 @@ class HessianFollower {
 
     // H += B_k^T dV B_k. False when the QP's inverse could not follow.
     bool add_marker(std::size_t k, const Mat3& change, bool follow_inverse) {
-        if (change.cwiseAbs().maxCoeff() == 0.0) return true;
-        SquareTerms terms;
-        if (!square_terms(change, terms)) return add_in_parts(k, change, follow_inverse);
         bool in_step = true;
-        for (std::size_t j = 0; j < 3; ++j) {
-            if (terms.sign[j] != 0.0)
-                in_step = add_term(k, terms.l[j], terms.sign[j] > 0.0, follow_inverse) && in_step;
-        }
-        return in_step;
-    }
-
-    // Rare: a change without usable pivots, as the difference of two definite ones.
-    bool add_in_parts(std::size_t k, const Mat3& change, bool follow_inverse) {
-        const Mat3 lift = 2.0 * change.cwiseAbs().sum() * Mat3::Identity();
-        SquareTerms terms;
-        bool in_step = true;
-        for (int part = 0; part < 2; ++part) {
-            if (!square_terms(part == 0 ? Mat3(change + lift) : lift, terms)) return false;
-            for (std::size_t j = 0; j < 3; ++j) {
-                in_step = add_term(k, terms.l[j], part == 0, follow_inverse) && in_step;
-            }
-        }
+        for_each_square(change, [&](const Vec3& l, bool add) {
+            in_step = add_term(k, l, add, follow_inverse) && in_step;
+        });
         return in_step;
     }
 
@@ -206,7 +162,8 @@ void build_linear(const SolvePack& pack, const NormalTables<Real>& tables, const
     for (std::size_t i = 0; i < n; ++i) {
         const double gamma = input.gamma_scale * static_cast<double>(pack.temporal_gamma[i]);
         const double previous = gamma > 0.0 ? input.previous[i] : 0.0;
-        e.linear[i] = half_beta - static_cast<Real>(gamma * previous);
+        const Real sparsity = pack.weight_low[i] >= 0.0F ? half_beta : Real(0);
+        e.linear[i] = sparsity - static_cast<Real>(gamma * previous);
         e.constant_mm2 += gamma * previous * previous;
     }
     for (std::size_t i = n; i < padded(n); ++i) e.linear[i] = Real(0);

@@ -3,8 +3,9 @@
 //   E(w) = sum_k (b0_k + B_k w - t_k)^T V_k (b0_k + B_k w - t_k) + beta |w|_1 + eps |w|^2 + sum_i gamma_i
 //   (w_i - p_i)^2
 //        = 2 (1/2 w^T H w + q^T w) + constant                                          [Hybrid16 eq. 3-4]
-//   H = B^T V B + diag(eps + gamma),   q = B^T V (b0 - t) + beta/2 1 - gamma p         (for w >= 0)
+//   H = B^T V B + diag(eps + gamma),   q = B^T V (b0 - t) + beta/2 - gamma p
 //
+// beta |w| is linear, and here only, where a shape's range does not go below 0; other shapes have none of it.
 // V_k = s^2 A_k: A_k the marker's information, s the pack's noise; so V = I for an ordinary 3D marker and E
 // is in mm^2. H follows from frame to frame by the rank-one terms of the markers that came, went or are seen
 // anew; so does the inverse that the box QP keeps. Real is float or double, as the box QP's.

@@ -133,12 +133,12 @@ void measure_fit(const RegionModel& region, const RegionalWorkspace& ws, RegionR
     report.residual_rms_mm = weights > 0.0 ? std::sqrt(sum / weights) : 0.0;
 }
 
-// Adds the region's share of every streamed shape, and takes the mean of their confidences by the same
-// shares.
+// Adds the region's share of every streamed shape. Its confidence is that of those shapes, as in
+// confidence.hpp with every variance counted by its share: P_ii / P0_ii = (1 - confidence_i)^2.
 void add_shapes(const SolvePack& pack, const RegionModel& region, const RegionalWorkspace& ws,
                 std::span<const float> confidence, RegionReport& report, std::span<double> shape_weights) {
-    double shares = 0.0;
-    double known = 0.0;
+    double prior = 0.0;
+    double posterior = 0.0;
     for (std::size_t i = 0; i < pack.shape_count; ++i) {
         const auto share = static_cast<double>(region.shape_blend[i]);
         if (share == 0.0) continue;
@@ -148,10 +148,12 @@ void add_shapes(const SolvePack& pack, const RegionModel& region, const Regional
                      static_cast<double>(region.shapes[j * pack.shape_count + i]);
         }
         shape_weights[i] += share * asked;
-        shares += share;
-        known += share * static_cast<double>(confidence[i]);
+        const auto sigma = static_cast<double>(pack.prior_sigma[i]);
+        const double unknown = (1.0 - static_cast<double>(confidence[i])) * sigma;
+        prior += share * sigma * sigma;
+        posterior += share * unknown * unknown;
     }
-    report.confidence = shares > 0.0 ? static_cast<float>(known / shares) : 0.0F;
+    report.confidence = prior > 0.0 ? static_cast<float>(1.0 - std::sqrt(posterior / prior)) : 0.0F;
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ struct RegionReport {
     double kkt = 0.0;
     double residual_rms_mm = 0.0;  // over the coordinates seen, by their weights
     double objective_mm2 = 0.0;    // sum of v |p - origin - E c|^2
-    float confidence = 0.0F;  // of the shapes it drives, by their blends: hiding a marker never raises it
+    float confidence = 0.0F;       // of the shapes it drives: hiding a marker never raises it
     std::uint16_t iterations = 0;
     std::uint16_t changes = 0;    // of the working set
     std::uint16_t rows_used = 0;  // 0: nothing of it was seen, and its last coefficients stay

@@ -53,20 +53,11 @@ double gamma_scale(const SolverConfig& config, const SolverState& state, std::in
 
 // Confidence depends on what is seen and from where, not on where it is, so it is kept until that changes.
 template <typename Real>
-void update_confidence(const SolverConfig& config, const NormalState<Real>& normal, bool changed,
-                       SolverState& state, SolverWorkspace& w) {
-    if (state.has_confidence && !changed) return;
-    const SolvePack& pack = config.pack;
-    const std::size_t n = pack.shape_count;
-    const std::size_t stride = row_stride(n);
-    for (std::size_t i = 0; i < n; ++i) {
-        const Real* row = normal.hessian.data() + i * stride;
-        for (std::size_t j = 0; j < i; ++j) w.gram[i * kMaxShapes + j] = static_cast<double>(row[j]);
-        w.gram_diagonal[i] = std::max(0.0, static_cast<double>(row[i] - normal.regularisation[i]));
-    }
-    weight_confidence({w.gram, w.gram_diagonal, pack.prior_sigma, static_cast<double>(pack.noise_mm)},
-                      w.confidence, state.confidence);
-    state.has_confidence = true;
+void update_confidence(const SolverConfig& config, const NormalState<Real>& normal, SolverState& state,
+                       SolverWorkspace& w) {
+    follow_confidence(config.pack, config.precise_tables, {normal.weights.data(), config.pack.marker_count},
+                      state.posterior, w.confidence);
+    read_confidence(config.pack, state.posterior, state.confidence);
 }
 
 template <typename Real>
@@ -197,15 +188,14 @@ void measure_firmness(const SolvePack& pack, SolverConfig& config) {
     config.pull_share = static_cast<double>(least) / mean;
 }
 
-template <typename Real>
-void configure_tables(const SolvePack& pack, NormalTables<Real>& tables, SolverWorkspace& w) {
-    build_normal_tables(pack, tables);
-    const std::size_t stride = row_stride(pack.shape_count);
-    for (std::size_t i = 0; i < pack.shape_count; ++i) {
-        const Real* row = tables.full_gram.data() + i * stride;
-        for (std::size_t j = 0; j < i; ++j) w.gram[i * kMaxShapes + j] = static_cast<double>(row[j]);
-        w.gram_diagonal[i] = static_cast<double>(row[i]);
-    }
+// With every marker seen as the pack's noise says.
+void measure_full_confidence(SolverWorkspace& w, SolverConfig& config) {
+    const std::size_t m = config.pack.marker_count;
+    for (std::size_t k = 0; k < m; ++k) w.weights[k] = Mat3::Identity();
+    w.full_posterior.valid = false;
+    follow_confidence(config.pack, config.precise_tables, {w.weights.data(), m}, w.full_posterior,
+                      w.confidence);
+    read_confidence(config.pack, w.full_posterior, config.full_confidence);
 }
 
 // Rest, before anything was seen: zero, as far as the ranges allow.
@@ -225,7 +215,7 @@ void solve_in(const SolverConfig& config, const NormalTables<Real>& tables, cons
     const std::size_t n = pack.shape_count;
     build_normal_equations(pack, tables, input, quadratic.normal, quadratic.qp, own.equations);
     report.markers_used = static_cast<std::uint16_t>(own.equations.markers_used);
-    update_confidence(config, quadratic.normal, own.equations.changed, state, w);
+    update_confidence(config, quadratic.normal, state, w);
     output.confidence = state.confidence;
     if (!enough) {
         output.weights = state.previous;
@@ -267,12 +257,10 @@ void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& wo
     config.rate_hz = rate_hz;
     measure_firmness(pack, config);
     build_regional_tables(pack, config.regional);
-    configure_tables(pack, config.tables, workspace);
-    configure_tables(pack, config.precise_tables, workspace);
+    build_normal_tables(pack, config.tables);
+    build_normal_tables(pack, config.precise_tables);
     if (pack.solver == SolverKind::kRbf) build_rbf_tables(pack, config.rbf);
-    weight_confidence(
-        {workspace.gram, workspace.gram_diagonal, pack.prior_sigma, static_cast<double>(pack.noise_mm)},
-        workspace.confidence, config.full_confidence);
+    measure_full_confidence(workspace, config);
     prepare_controls(pack, ControlSet{}, config.controls);
 }
 
@@ -284,7 +272,7 @@ void reset_solver(SolverState& state) {
     state.controlled.qp.warm = false;
     reset_regions(state.regional);
     state.has_previous = false;
-    state.has_confidence = false;
+    state.posterior.valid = false;
     state.confidence = {};
 }
 
@@ -302,8 +290,6 @@ void solve(const SolverConfig& config, const StabiliserOutput& stabilised, const
     input.gamma_scale = gamma_scale(config, state, capture_us);
     const bool firm = config.ridge_share + input.gamma_scale * config.pull_share >= kFirmShare;
     const bool single = firm && !config.controls.acts_on_problem;
-    if (single != state.in_single) state.has_confidence = false;
-    state.in_single = single;
     if (single) {
         solve_in(config, config.tables, completed, input, enough, state, state.quadratic, w.quadratic, w,
                  output, report);

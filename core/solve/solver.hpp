@@ -68,13 +68,11 @@ struct SolverState {
     QuadraticState<float> quadratic;
     QuadraticState<double> precise;
     RegionalState regional;
-    bool in_single = false;  // precision of the last frame
     ControlledState controlled;
     bool has_previous = false;
     std::int64_t previous_us = 0;
     std::array<double, kMaxShapes> previous{};
-    // Confidence changes only with what is seen, so it is kept until that changes.
-    bool has_confidence = false;
+    ConfidenceState posterior;
     std::array<float, kMaxShapes> confidence{};
 };
 
@@ -86,9 +84,8 @@ struct SolverWorkspace {
     RegionalWorkspace regional;
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> weights{};
-    std::array<double, kMaxShapes * kMaxShapes> gram{};  // B^T V B for the confidence
-    std::array<double, kMaxShapes> gram_diagonal{};
     ConfidenceWorkspace confidence;
+    ConfidenceState full_posterior;  // of set-up
     std::array<float, kMaxRows> flat_mm{};
 };
 

@@ -112,8 +112,8 @@ Result<void, FileError> save_picture(const KeyShapesCommand& command, const std:
         line.errors.push_back(row.error.rms_mm);
     }
     return draw_errors(folder / "error.png", lines,
-                       fmt::format("{}: error of every frame, {} axes", command.region, command.axes),
-                       "key shapes", "rms mm");
+                       fmt::format("{}: rms error of a coordinate over all frames, axes {}", command.region, command.axes),
+                       "key shapes", "mm");
 }
 
 Result<void, FileError> save_shapes(const std::filesystem::path& folder, const Inputs& inputs,

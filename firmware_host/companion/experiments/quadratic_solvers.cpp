@@ -31,8 +31,9 @@ std::vector<float> clamped(std::vector<float> weights) {
     return weights;
 }
 
-Result<BoxQpPipeline, FileError> BoxQpPipeline::learn(const RecordedHead& head, bool stabilise) {
-    auto trained = train(head.rig, head.layout, {});
+Result<BoxQpPipeline, FileError> BoxQpPipeline::learn(const RecordedHead& head, bool stabilise,
+                                                      const TrainOptions& options) {
+    auto trained = train(head.rig, head.layout, options);
     if (!trained) return failure(trained.error());
     BoxQpPipeline out;
     out.pack_ = std::make_unique<TrainedPack>(std::move(*trained));

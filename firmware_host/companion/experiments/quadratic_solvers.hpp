@@ -29,9 +29,10 @@ class EquationSolving {
 // after the solve.
 class BoxQpPipeline {
   public:
-    // Trained as `headrig train --solver boxqp` does, without a take. `stabilise`: with slip and bad markers
-    // taken out.
-    [[nodiscard]] static Result<BoxQpPipeline, FileError> learn(const RecordedHead& head, bool stabilise);
+    // Trained as `headrig train --solver boxqp` does, without a take unless `options` has one. `stabilise`:
+    // with slip and bad markers taken out.
+    [[nodiscard]] static Result<BoxQpPipeline, FileError> learn(const RecordedHead& head, bool stabilise,
+                                                                const TrainOptions& options = {});
     // The next frame, 1/60 s after the last; t [3m]; the result [N] is valid until the next call.
     std::span<const float> solve(std::span<const float> t);
     void restart();

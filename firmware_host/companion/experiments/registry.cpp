@@ -18,6 +18,9 @@ std::span<const Experiment> all_experiments() {
                    deng06_variance},
         Experiment{"rbf-dimensions", "Deng06 section 8: how many components, in the take and across takes",
                    rbf_dimensions},
+        Experiment{"temporal-prior",
+                   "Methods 3.7: what the pull towards the previous solution costs and gives",
+                   temporal_prior},
         Experiment{"zhang06-regions", "Zhang06 section 5.3: small regions against the whole face",
                    zhang06_regions},
     };

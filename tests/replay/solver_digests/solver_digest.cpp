@@ -1,4 +1,5 @@
-// solver_digest    solves generated trajectories and prints one digest of every weight's bits. The same
+// solver_digest    solves generated trajectories, the box QP alone and the whole stage with each solver, and
+// prints one digest of every weight's bits. The same
 // source is built several times, with other optimisation and other instruction sets;
 // tests/replay/solver_digests compares what they print. "unsupported" where the processor lacks what the
 // build was made for.
@@ -10,6 +11,7 @@
 #include "core/solve/box_qp.hpp"
 #include "core/solve/nnls.hpp"
 #include "core/solve/simplex_qp.hpp"
+#include "core/solve/solver.hpp"
 #include "tests/support/digest.hpp"
 #include "tests/support/random.hpp"
 #include "tests/support/solver_problems.hpp"
@@ -129,6 +131,116 @@ void run_region(std::size_t rows, std::size_t count, bool dependent, test::Diges
     }
 }
 
+// A pack of numbers drawn at random: each shape moves a few markers, every solver has what it needs.
+struct StagePack {
+    explicit StagePack(SolverKind solver) {
+        test::SeededRandom random(7);
+        constexpr std::size_t kRows = 3 * kMarkers;
+        const auto draw = [&](std::size_t count, double mean, double deviation) {
+            std::vector<float> values(count);
+            for (float& x : values) x = static_cast<float>(random.normal(mean, deviation));
+            return values;
+        };
+        neutral = draw(kRows, 0.0, 40.0);
+        basis.assign(kRows * kShapes, 0.0F);
+        for (std::size_t i = 0; i < kShapes; ++i) {
+            for (std::size_t r = 0; r < 24; ++r)
+                basis[random.below(kRows) * kShapes + i] = static_cast<float>(random.normal(0.0, 3.0));
+        }
+        low.assign(kShapes, 0.0F);
+        high.assign(kShapes, 1.0F);
+        mean.assign(kShapes, 0.1F);
+        sigma.assign(kShapes, 0.3F);
+        gamma.assign(kShapes, solver == SolverKind::kBoxQp ? 5.0F : 0.0F);
+        axes = draw(kDimensions * kRows, 0.0, 0.1);
+        centres = draw(kCentres * kDimensions, 0.0, 10.0);
+        widths.assign(kCentres, 12.0F);
+        regression = draw(kCentres * kShapes, 0.0, 0.1);
+        view.marker_count = kMarkers;
+        view.shape_count = kShapes;
+        view.solver = solver;
+        view.neutral_mm = neutral;
+        view.basis_mm = basis;
+        view.weight_low = low;
+        view.weight_high = high;
+        view.prior_mean = mean;
+        view.prior_sigma = sigma;
+        view.temporal_gamma = gamma;
+        view.sparsity_mm2 = view.ridge_mm2 = solver == SolverKind::kBoxQp ? 0.05F : 0.0F;
+        view.rbf = {RbfKernel::kThinPlate,
+                    0.5F,
+                    1.5F,
+                    kDimensions,
+                    kCentres,
+                    neutral,
+                    axes,
+                    centres,
+                    widths,
+                    regression,
+                    mean};
+    }
+    static constexpr std::uint16_t kMarkers = 50;
+    static constexpr std::uint16_t kShapes = 46;
+    static constexpr std::uint16_t kDimensions = 6;
+    static constexpr std::uint16_t kCentres = 40;
+    std::vector<float> neutral, basis, low, high, mean, sigma, gamma, axes, centres, widths, regression;
+    SolvePack view;
+};
+
+// Markers move, go, come back and are seen by one camera; in the last third an artist's controls act.
+void see_frame(const StagePack& pack, int frame, test::SeededRandom& random, StabiliserOutput& seen,
+               InferenceOutput& completed) {
+    seen.count = completed.count = StagePack::kMarkers;
+    for (std::size_t k = 0; k < StagePack::kMarkers; ++k) {
+        Vec3 position;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const std::size_t row = 3 * k + axis;
+            double at = static_cast<double>(pack.neutral[row]) + random.normal(0.0, 0.1);
+            for (std::size_t i = 0; i < StagePack::kShapes; ++i) {
+                const int phase = (frame + 17 * static_cast<int>(i)) % 80;
+                const double weight = phase < 40 ? phase * 0.025 : 2.0 - phase * 0.025;
+                at += 0.5 * weight * static_cast<double>(pack.basis[row * StagePack::kShapes + i]);
+            }
+            position[static_cast<Eigen::Index>(axis)] = at;
+        }
+        completed.position_mm[k] = position;
+        StabilisedMarker& marker = seen.markers[k];
+        marker.seen = !random.chance(0.02);
+        marker.position_mm = position;
+        marker.information = 100.0 * Mat3::Identity();
+        if (random.chance(0.02)) marker.information(2, 2) = 1.0;
+    }
+}
+
+void run_stage(SolverKind solver, test::Digest& digest) {
+    const StagePack pack(solver);
+    const auto config = std::make_unique<SolverConfig>();
+    const auto state = std::make_unique<SolverState>();
+    const auto workspace = std::make_unique<SolverWorkspace>();
+    const auto output = std::make_unique<SolverOutput>();
+    const auto seen = std::make_unique<StabiliserOutput>();
+    const auto completed = std::make_unique<InferenceOutput>();
+    SolverReport report;
+    configure_solver(pack.view, 60.0, *workspace, *config);
+    ControlSet controls;
+    controls.shapes[3].ridge = 20.0F;
+    controls.shapes[4].high = 0.3F;
+    static_cast<void>(controls.symmetry.push_back({5, 6, 0.5F}));
+    static_cast<void>(controls.cancel.push_back({7, 8}));
+    test::SeededRandom random(8);
+    for (int frame = 0; frame < 90; ++frame) {
+        if (frame == 60) prepare_controls(pack.view, controls, config->controls);
+        see_frame(pack, frame, random, *seen, *completed);
+        solve(*config, *seen, *completed, frame * 16'667, *state, *workspace, *output, report);
+        for (std::size_t i = 0; i < StagePack::kShapes; ++i) {
+            digest.add(output->weights[i]);
+            digest.add(output->confidence[i]);
+        }
+        digest.add(report.kkt);
+        digest.add(report.hull_share);
+    }
+}
+
 }  // namespace
 
 int main() {
@@ -144,6 +256,9 @@ int main() {
     run_region(60, 12, false, digest);
     run_region(27, 15, true, digest);
     run_region(45, 24, true, digest);
+    for (const SolverKind solver :
+         {SolverKind::kLeastSquares, SolverKind::kNonNegative, SolverKind::kBoxQp, SolverKind::kRbf})
+        run_stage(solver, digest);
     std::printf("%016llx\n", static_cast<unsigned long long>(digest.value()));
     return 0;
 }

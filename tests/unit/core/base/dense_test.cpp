@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/base/float_kernels.hpp"
 #include "tests/support/random.hpp"
 
 namespace rig {
@@ -110,22 +111,27 @@ TEST(Dense, CholeskyInPlaceGivesTheSameFactor) {
     }
 }
 
-TEST(Dense, InverseDiagonalMatchesColumnSolves) {
+TEST(Dense, SymmetricInverseMatchesColumnSolves) {
     test::SeededRandom random(7);
-    const std::size_t n = 31;
-    const Matrix a = positive_definite(n, n, 0.2, random);
-    Matrix l(n * n, 0.0);
-    ASSERT_TRUE(cholesky(a.data(), l.data(), n, n));
-    std::vector<double> diagonal(n);
-    std::vector<double> scratch(n);
-    inverse_diagonal(l.data(), n, n, diagonal.data(), scratch.data());
-    for (std::size_t i = 0; i < n; ++i) {
-        std::vector<double> unit(n, 0.0);
-        unit[i] = 1.0;
-        solve_lower(l.data(), n, n, unit.data());
-        solve_lower_transposed(l.data(), n, n, unit.data());
-        EXPECT_NEAR(diagonal[i], unit[i], 1e-12 * unit[i] + 1e-14);
-        EXPECT_GT(diagonal[i], 0.0);
+    for (const std::size_t n : {std::size_t{1}, std::size_t{16}, std::size_t{31}, std::size_t{53}}) {
+        const std::size_t stride = row_stride(n);
+        const Matrix a = positive_definite(n, stride, 0.2, random);
+        Matrix l(n * stride, 0.0);
+        ASSERT_TRUE(cholesky(a.data(), l.data(), n, stride));
+        Matrix inverse(n * stride, 7.0);
+        std::vector<double> scratch(n);
+        symmetric_inverse(l.data(), n, stride, inverse.data(), scratch.data());
+        for (std::size_t i = 0; i < n; ++i) {
+            std::vector<double> column(n, 0.0);
+            column[i] = 1.0;
+            solve_lower(l.data(), n, stride, column.data());
+            solve_lower_transposed(l.data(), n, stride, column.data());
+            for (std::size_t j = 0; j < n; ++j) {
+                EXPECT_NEAR(inverse[i * stride + j], column[j], 1e-12 * column[i] + 1e-14);
+                EXPECT_EQ(inverse[i * stride + j], inverse[j * stride + i]);
+            }
+            for (std::size_t j = n; j < padded(n); ++j) EXPECT_EQ(inverse[i * stride + j], 0.0);
+        }
     }
 }
 

@@ -24,6 +24,9 @@ struct Scene {
         face = std::make_unique<test::SyntheticFace>(options);
         pack = face->pack();
         pack.sparsity_mm2 = 0.3F;
+        low.assign(pack.weight_low.begin(), pack.weight_low.end());
+        low[4] = -0.5F;  // |w| is not linear there
+        pack.weight_low = low;
         build_normal_tables(pack, *tables);
         positions = face->positions(face->random_weights(random));
         test::add_noise(positions, 0.3, random);
@@ -74,7 +77,7 @@ struct Scene {
         for (std::size_t i = 0; i < 16; ++i) {
             const auto x = static_cast<long double>(w[i]);
             const long double d = x - static_cast<long double>(previous[i]);
-            sum += static_cast<long double>(pack.sparsity_mm2) * x +
+            sum += (low[i] < 0.0F ? 0.0L : static_cast<long double>(pack.sparsity_mm2) * x) +
                    static_cast<long double>(pack.ridge_mm2) * x * x;
             sum += static_cast<long double>(gamma_scale) * static_cast<long double>(pack.temporal_gamma[i]) *
                    d * d;
@@ -91,6 +94,7 @@ struct Scene {
     std::unique_ptr<NormalEquations<double>> equations = std::make_unique<NormalEquations<double>>();
     std::vector<Vec3> positions;
     std::vector<Mat3> weights;
+    std::vector<float> low;
     std::vector<double> previous;
     double gamma_scale = 0.5;
 };

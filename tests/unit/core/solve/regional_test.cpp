@@ -99,8 +99,22 @@ TEST(Regional, ConfidenceIsThatOfTheShapesARegionSpeaksFor) {
     face.confidence = {0.8F, 0.1F, 0.4F, 0.3F};
     face.solve();
     // Region 0 has half of shape 0 and all of shape 2, region 1 half of shape 0 and all of 1 and 3.
-    EXPECT_NEAR(face.output.regions[0].confidence, (0.5 * 0.8 + 0.4) / 1.5, 1e-6);
-    EXPECT_NEAR(face.output.regions[1].confidence, (0.5 * 0.8 + 0.1 + 0.3) / 2.5, 1e-6);
+    const auto of = [&](std::vector<std::pair<std::size_t, double>> shares) {
+        double prior = 0.0, posterior = 0.0;
+        for (const auto& [i, share] : shares) {
+            const double sigma = static_cast<double>(face.sample.view.prior_sigma[i]);
+            const double left = sigma * (1.0 - static_cast<double>(face.confidence[i]));
+            prior += share * sigma * sigma;
+            posterior += share * left * left;
+        }
+        return 1.0 - std::sqrt(posterior / prior);
+    };
+    EXPECT_NEAR(face.output.regions[0].confidence, of({{0, 0.5}, {2, 1.0}}), 1e-6);
+    EXPECT_NEAR(face.output.regions[1].confidence, of({{0, 0.5}, {1, 1.0}, {3, 1.0}}), 1e-6);
+    face.confidence[2] = 0.3F;
+    const float before = face.output.regions[0].confidence;
+    face.solve();
+    EXPECT_LT(face.output.regions[0].confidence, before);
 }
 
 TEST(Regional, HiddenMarkersAreLeftOutAndAHiddenRegionHolds) {
