@@ -59,6 +59,7 @@ struct FrameReport {
     double kkt = 0.0;            // largest move of a projected Jacobi step; dimensionless
     double objective_mm2 = 0.0;  // E at the answer
     std::uint16_t iterations = 0;
+    std::uint16_t working_set_changes = 0;  // variables that reached or left a bound, in this frame's solve
     std::uint16_t markers_used = 0;
     double residual_rms_mm = 0.0;  // over the coordinates of the markers used
     double hull_distance = 0.0;    // RBF packs: distance to the nearest reference, in its widths

@@ -239,6 +239,7 @@ void Pipeline::solve_named(std::int64_t capture_us, FrameReport& report) {
     report.kkt = solver_report_.kkt;
     report.objective_mm2 = solver_report_.objective_mm2;
     report.iterations = solver_report_.iterations;
+    report.working_set_changes = solver_report_.changes;
     report.markers_used = solver_report_.markers_used;
     report.residual_rms_mm = solver_report_.residual_rms_mm;
     report.hull_distance = solver_report_.hull_distance;

@@ -135,17 +135,17 @@ void read_confidence(const SolvePack& pack, const ConfidenceState& state, std::s
     }
 }
 
-float region_confidence(const SolvePack& pack, const ConfidenceState& state,
-                        std::span<const std::uint16_t> shapes) {
-    const std::size_t stride = row_stride(pack.shape_count);
+float region_confidence(std::span<const float> prior_sigma, std::span<const float> confidence,
+                        std::span<const std::size_t> shapes) {
     double posterior = 0.0;
     double prior = 0.0;
-    for (const std::uint16_t i : shapes) {
-        const auto sigma = static_cast<double>(pack.prior_sigma[i]);
-        posterior += state.posterior[i * stride + i];
+    for (const std::size_t i : shapes) {
+        const auto sigma = static_cast<double>(prior_sigma[i]);
+        const double left = sigma * (1.0 - static_cast<double>(confidence[i]));
+        posterior += left * left;
         prior += sigma * sigma;
     }
-    return state.valid && prior > 0.0 ? from_variances(posterior, prior) : 0.0F;
+    return prior > 0.0 ? from_variances(posterior, prior) : 0.0F;
 }
 
 }  // namespace rig

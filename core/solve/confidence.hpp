@@ -40,8 +40,8 @@ void follow_confidence(const SolvePack& pack, const NormalTables<double>& tables
 // confidence [N], 0..1; all zero when P is no covariance (V was not finite).
 void read_confidence(const SolvePack& pack, const ConfidenceState& state, std::span<float> confidence);
 
-// Of the shapes of a region, 0..1; 0 for none.
-[[nodiscard]] float region_confidence(const SolvePack& pack, const ConfidenceState& state,
-                                      std::span<const std::uint16_t> shapes);
+// Of the shapes of a region by the confidence of each [N], 0..1; 0 for none.
+[[nodiscard]] float region_confidence(std::span<const float> prior_sigma, std::span<const float> confidence,
+                                      std::span<const std::size_t> shapes);
 
 }  // namespace rig

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -64,6 +65,20 @@ void Progress::update(std::uint64_t done, std::string_view note) {
     fmt::print(stderr, "\r\x1b[K{} [{:#<{}}{:.<{}}] {:3.0f} % {}", what_, "", filled, "", 30 - filled,
                fraction * 100.0, note);
     std::fflush(stderr);
+}
+
+std::optional<FrameRange> read_frame_range(std::string_view text) {
+    const std::size_t colon = text.find(':');
+    if (colon == std::string_view::npos) return std::nullopt;
+    FrameRange range;
+    const auto read = [](std::string_view part, std::size_t& value) {
+        const auto result = std::from_chars(part.data(), part.data() + part.size(), value);
+        return result.ec == std::errc{} && result.ptr == part.data() + part.size();
+    };
+    if (!read(text.substr(0, colon), range.begin) || !read(text.substr(colon + 1), range.end))
+        return std::nullopt;
+    if (range.begin >= range.end) return std::nullopt;
+    return range;
 }
 
 void install_interrupt_handler() {

@@ -1,7 +1,9 @@
 // What verbs say to a person: progress, errors, and whether anybody looks.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -30,6 +32,13 @@ class Progress {
     int tenth_ = 0;
     bool drawn_ = false;
 };
+
+// "BEGIN:END", frames from 0, END not included; nothing for anything else, or an empty range.
+struct FrameRange {
+    std::size_t begin = 0;
+    std::size_t end = 0;
+};
+[[nodiscard]] std::optional<FrameRange> read_frame_range(std::string_view text);
 
 // True after Ctrl-C or SIGTERM, once install_interrupt_handler() ran.
 void install_interrupt_handler();

@@ -34,7 +34,7 @@ struct KeyShapesCommand {
 struct Inputs {
     Rig rig;
     MarkerModel model;
-    std::vector<FaceRegion> regions;
+    std::vector<MarkerRegion> regions;
     std::vector<Take> takes;
 };
 
@@ -111,9 +111,10 @@ Result<void, FileError> save_picture(const KeyShapesCommand& command, const std:
         line.counts.push_back(static_cast<double>(row.count));
         line.errors.push_back(row.error.rms_mm);
     }
-    return draw_errors(folder / "error.png", lines,
-                       fmt::format("{}: rms error of a coordinate over all frames, axes {}", command.region, command.axes),
-                       "key shapes", "mm");
+    return draw_errors(
+        folder / "error.png", lines,
+        fmt::format("{}: rms error of a coordinate over all frames, axes {}", command.region, command.axes),
+        "key shapes", "mm");
 }
 
 Result<void, FileError> save_shapes(const std::filesystem::path& folder, const Inputs& inputs,
@@ -153,10 +154,10 @@ int run_key_shapes(const KeyShapesCommand& command) {
         print_error(inputs.error().message);
         return kExitInput;
     }
-    const auto region = std::ranges::find(inputs->regions, command.region, &FaceRegion::name);
+    const auto region = std::ranges::find(inputs->regions, command.region, &MarkerRegion::name);
     if (region == inputs->regions.end()) {
         std::string names;
-        for (const FaceRegion& one : inputs->regions) names += " " + one.name;
+        for (const MarkerRegion& one : inputs->regions) names += " " + one.name;
         print_error(fmt::format("--region {}: this layout has the regions{}", command.region, names));
         return kExitUsage;
     }

@@ -9,6 +9,7 @@
 
 #include "core/base/math.hpp"
 #include "core/pipeline/pipeline.hpp"
+#include "core/solve/confidence.hpp"
 #include "firmware_host/companion/commands/console.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/files/csv.hpp"
@@ -16,6 +17,7 @@
 #include "firmware_host/pack_file/opened_pack.hpp"
 #include "firmware_host/settings/control_settings.hpp"
 #include "firmware_host/settings/settings_file.hpp"
+#include "firmware_host/settings/shape_selection.hpp"
 
 namespace rig::host {
 
@@ -37,22 +39,41 @@ struct SolveOptions {
     double rate_hz = 60.0;
 };
 
+// The parts of the face whose confidence is reported: those of the regions that this pack has shapes of.
+struct ReportedRegion {
+    std::string name;
+    std::vector<std::size_t> shapes;
+};
+
 // What the outputs are collected in before any file is written.
 struct SolveResults {
+    std::vector<ReportedRegion> regions;
     CsvWriter weights;
     CsvWriter report;
     NpyArray<std::int32_t> labels;
     NpyArray<float> points;
 };
 
-std::vector<std::string> report_columns(const SolvePack& pack) {
-    std::vector<std::string> columns{
-        "frame",        "state",           "kkt",         "objective",    "iterations",
-        "markers_used", "residual_rms_mm", "slip_rx_rad", "slip_ry_rad",  "slip_rz_rad",
-        "slip_tx_mm",   "slip_ty_mm",      "slip_tz_mm",  "delay_frames", "delay_ms"};
+std::vector<ReportedRegion> reported_regions(const SolvePack& pack) {
+    std::vector<ReportedRegion> regions;
+    for (const char* name : {"brows", "lids", "cheeks", "nose", "mouth", "jaw"}) {
+        auto shapes = select_shapes(name, std::span(pack.shape_names).first(pack.shape_count));
+        if (shapes && !shapes->empty()) regions.push_back({name, std::move(*shapes)});
+    }
+    return regions;
+}
+
+std::vector<std::string> report_columns(const SolvePack& pack, std::span<const ReportedRegion> regions) {
+    std::vector<std::string> columns{"frame",        "state",        "kkt",
+                                     "objective",    "iterations",   "working_set_changes",
+                                     "optimal",      "markers_used", "residual_rms_mm",
+                                     "slip_rx_rad",  "slip_ry_rad",  "slip_rz_rad",
+                                     "slip_tx_mm",   "slip_ty_mm",   "slip_tz_mm",
+                                     "delay_frames", "delay_ms"};
+    for (const ReportedRegion& region : regions) columns.push_back("confidence_" + region.name);
     for (std::size_t r = 0; r < pack.region_count; ++r) {
-        columns.push_back(fmt::format("{}_residual_mm", pack.regions[r].name));
-        columns.push_back(fmt::format("{}_confidence", pack.regions[r].name));
+        columns.push_back(fmt::format("region_{}_residual_mm", pack.regions[r].name));
+        columns.push_back(fmt::format("region_{}_confidence", pack.regions[r].name));
     }
     return columns;
 }
@@ -98,18 +119,24 @@ Result<void, FileError> check_stream(const SolveOptions& options, const SolvePac
                               options.markers, stream.shape[1], options.pack, pack.marker_count)});
 }
 
-void add_report_row(std::size_t frame, const SolvePack& pack, const FaceState& state,
-                    const FrameReport& report, const RegionalOutput& regions, CsvWriter& csv) {
+void add_report_row(std::size_t frame, const SolvePack& pack, std::span<const ReportedRegion> regions,
+                    const FaceState& state, const FrameReport& report, const RegionalOutput& solved,
+                    CsvWriter& csv) {
     csv.integer(static_cast<std::int64_t>(frame)).text(state_name(state.state));
     csv.number(report.kkt, 12).number(report.objective_mm2, 6).integer(report.iterations);
+    csv.integer(report.working_set_changes).integer(report.optimal ? 1 : 0);
     csv.integer(report.markers_used).number(report.residual_rms_mm, 6);
     for (const float r : state.slip.rotation_rad) csv.number(static_cast<double>(r), 7);
     for (const float t : state.slip.translation_mm) csv.number(static_cast<double>(t), 5);
     csv.integer(report.delay_frames).number(static_cast<double>(report.delay_us) * 1e-3, 3);
+    for (const ReportedRegion& region : regions) {
+        csv.number(static_cast<double>(region_confidence(pack.prior_sigma, state.confidence, region.shapes)),
+                   5);
+    }
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
     for (std::size_t r = 0; r < pack.region_count; ++r) {
-        csv.number(report.solved ? regions.regions[r].residual_rms_mm : kNone, 6);
-        csv.number(report.solved ? static_cast<double>(regions.regions[r].confidence) : kNone, 4);
+        csv.number(report.solved ? solved.regions[r].residual_rms_mm : kNone, 6);
+        csv.number(report.solved ? static_cast<double>(solved.regions[r].confidence) : kNone, 4);
     }
     csv.end_row();
 }
@@ -122,7 +149,7 @@ void add_results(const SolveOptions& options, const SolvePack& pack, std::size_t
     for (std::size_t i = 0; i < pack.shape_count; ++i)
         results.weights.number(static_cast<double>(state.weights[i]), 6);
     results.weights.end_row();
-    add_report_row(frame, pack, state, report, regions, results.report);
+    add_report_row(frame, pack, results.regions, state, report, regions, results.report);
     for (std::size_t s = 0; s < slots; ++s) results.labels.values.push_back(report.labels[s]);
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -265,7 +292,10 @@ int run_solve(const SolveOptions& command_line) {
         print_error(set.error());
         return kExitUsage;
     }
-    SolveResults results{CsvWriter(weight_columns(pack)), CsvWriter(report_columns(pack)), {}, {}};
+    std::vector<ReportedRegion> regions = reported_regions(pack);
+    SolveResults results{
+        {}, CsvWriter(weight_columns(pack)), CsvWriter(report_columns(pack, regions)), {}, {}};
+    results.regions = std::move(regions);
     results.labels.shape = {stream->shape[0], stream->shape[1]};
     results.points.shape = {stream->shape[0], pack.marker_count, 3};
     install_interrupt_handler();
@@ -311,7 +341,8 @@ void add_solve_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--out", options->weights_csv,
                      "Weights: frame,time_s,<shapes> (default: standard output)")
         ->type_name("W.csv");
-    verb->add_option("--report", options->report_csv, "Certificate and slip of every frame")
+    verb->add_option("--report", options->report_csv,
+                     "Certificate, slip and delay of every frame; columns in the folder's README")
         ->type_name("R.csv");
     verb->add_option("--labels", options->labels_npy,
                      "(frames, slots) int32: the marker of each slot, -1 = ghost")

@@ -1,30 +1,44 @@
 // headrig train: a pack for a head, a marker layout and a solver.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "firmware_host/companion/commands/console.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
+#include "firmware_host/companion/files/whole_file.hpp"
+#include "firmware_host/companion/fit/layout_fit.hpp"
+#include "firmware_host/companion/fit/marker_noise.hpp"
+#include "firmware_host/companion/report/pack_page.hpp"
 #include "firmware_host/companion/train/camera_file.hpp"
 #include "firmware_host/companion/train/pack_writer.hpp"
 #include "firmware_host/companion/train/train.hpp"
+#include "firmware_host/companion/train/training_record.hpp"
+#include "firmware_host/pack_file/opened_pack.hpp"
 
 namespace rig::host {
 
 namespace {
+
+constexpr double kResidualAlarm = 2.0;  // times the noise, from which the layout is doubted
 
 struct TrainCommand {
     std::string rig;
     std::string layout = "60";
     std::string out;
     std::string cameras;
+    std::string markers;
+    std::string hold;
     std::string temporal = "auto";
+    bool noise_given = false;
+    std::string report;
     std::string name;
     std::string method = "spread";
     std::vector<std::string> takes;
@@ -75,6 +89,43 @@ void print_result(const TrainCommand& command, const TrainedPack& pack) {
     }
     fmt::print("rbf weight rms: {:.4f} in the take ({:.4f} over visible shapes), {:.4f} on blocks left out\n",
                rbf.in_take_rms, rbf.visible_in_take_rms, rbf.cross_validated_rms);
+    const Coverage& coverage = *pack.report.coverage;
+    fmt::print(
+        "coverage: {:.1f} % of the frames within one width of a reference, {:.1f} % beyond three; distance "
+        "p50 {:.2f}, p90 {:.2f}, p99 {:.2f}, max {:.2f} widths; p90 {:.2f} mm of a spread of {:.2f} mm\n",
+        100.0 * coverage.covered_share, 100.0 * coverage.lost_share, coverage.widths[0], coverage.widths[1],
+        coverage.widths[2], coverage.widths[3], coverage.distance_mm[1], coverage.spread_mm);
+}
+
+// Of the pack that has just been written; nothing for a pack without a regression.
+Result<std::optional<TrainingRecord>, FileError> record_of(const TrainCommand& command,
+                                                           const TrainedPack& pack) {
+    if (!pack.report.rbf) return std::nullopt;
+    const auto opened = open_pack_file(command.out);
+    if (!opened) return failure(FileError{opened.error().message});
+    return TrainingRecord{.pack_uuid = uuid_text(opened->manifest()),
+                          .rbf = *pack.report.rbf,
+                          .coverage = pack.report.coverage.value_or(Coverage{}),
+                          .shape_names = pack.shape_names};
+}
+
+// What training knows and the pack does not hold: the curves beside it, and the page when it is asked for.
+Result<void, FileError> write_reports(const TrainCommand& command, const TrainedPack& pack) {
+    auto record = record_of(command, pack);
+    if (!record) return failure(record.error());
+    if (*record) {
+        const auto saved =
+            write_whole_text(training_record_path(command.out), training_record_text(**record));
+        if (!saved) return saved;
+    }
+    if (command.report.empty()) return {};
+    const SolvePack view = pack.view();
+    const Take* take = command.options.takes.empty() ? nullptr : &command.options.takes.front();
+    const auto analysis = analyse_pack(view, take);
+    if (!analysis) return failure(analysis.error());
+    const PackPageInput input{
+        .name = command.identity.name, .pack = view, .analysis = *analysis, .training = std::move(*record)};
+    return write_whole_text(command.report, pack_page(input));
 }
 
 void print_warnings(const TrainedPack& pack) {
@@ -117,12 +168,65 @@ Result<void, FileError> load_inputs(TrainCommand& command, Rig& rig, MarkerLayou
     return {};
 }
 
-int run_train(TrainCommand& command) {
+// From the recorded markers that --markers names, before training: the noise that the pack is to expect.
+Result<void, FileError> estimate_noise(TrainCommand& command, const MarkerLayout& layout, MarkerTake& take) {
+    auto loaded = load_marker_take(command.markers, command.options.rate_hz);
+    if (!loaded) return failure(loaded.error());
+    take = std::move(*loaded);
+    if (take.marker_count != layout.markers.size()) {
+        return failure(FileError{fmt::format("{}: {} markers a frame, but the layout has {}", command.markers,
+                                             take.marker_count, layout.markers.size())});
+    }
+    const CoordinateNoise differences = noise_of_differences(take);
+    CoordinateNoise hold;
+    if (const auto range = read_frame_range(command.hold))
+        hold = noise_of_hold(take, range->begin, range->end);
+    if (!command.hold.empty() && hold.markers == 0) {
+        return failure(FileError{fmt::format("{}: no marker is seen in {} frames of the hold {}",
+                                             command.markers, kLeastNoiseSamples, command.hold)});
+    }
+    const double chosen = hold.markers > 0 ? hold.pooled_mm : differences.pooled_mm;
+    if (!(chosen > 0.0)) {
+        return failure(
+            FileError{fmt::format("{}: too few frames to tell the noise ({} in which a marker is seen five "
+                                  "times in a row are needed); "
+                                  "give it with --noise-mm",
+                                  command.markers, kLeastNoiseSamples)});
+    }
+    fmt::print("noise of a coordinate: {:.4f} mm from fourth differences ({} markers)", differences.pooled_mm,
+               differences.markers);
+    if (hold.markers > 0) fmt::print("; {:.4f} mm from the hold {}", hold.pooled_mm, command.hold);
+    fmt::print("; the pack takes {}\n", command.noise_given ? "that of --noise-mm"
+                                        : hold.markers > 0  ? "the hold's"
+                                                            : "the differences'");
+    if (!command.noise_given) command.options.noise_mm = std::clamp(chosen, 1e-4, 100.0);
+    return {};
+}
+
+// After training: what the model cannot explain of the same markers.
+void print_residual(const TrainedPack& pack, const MarkerTake& take) {
+    if (pack.solver == SolverKind::kRbf) return;  // a regression has no degrees of freedom to take off
+    const MarkerTake thin = thinned(take, kMostFitFrames);
+    const auto residual = noise_of_residual(pack.view(), thin, solve_take(pack.view(), thin, true));
+    if (!residual) return;
+    fmt::print("residual of a coordinate after the solve: {:.4f} mm\n", *residual);
+    if (*residual <= kResidualAlarm * pack.noise_mm) return;
+    print_error(fmt::format(
+        "warning: the residual is {:.1f} times the noise: markers are not where the layout says, names "
+        "are swapped, or the shapes cannot make these faces; see `headrig fit`",
+        *residual / pack.noise_mm));
+}
+
+// Reads the options that are text; what is wrong with the command line, empty when nothing is.
+std::string fault_of_command(TrainCommand& command) {
     if (!read_temporal(command.temporal, command.options.temporal)) {
-        print_error(
-            fmt::format("--temporal {}: give auto, on, off or the step a weight takes in a frame, e.g. 0.03",
-                        command.temporal));
-        return kExitUsage;
+        return fmt::format(
+            "--temporal {}: give auto, on, off or the step a weight takes in a frame, e.g. 0.03",
+            command.temporal);
+    }
+    if (!command.hold.empty() && (command.markers.empty() || !read_frame_range(command.hold))) {
+        return fmt::format("--hold {}: give the frames of --markers in which the face holds still, e.g. 0:60",
+                           command.hold);
     }
     const auto method = key_shape_method(command.method);
     if (!method) {
@@ -134,7 +238,11 @@ int run_train(TrainCommand& command) {
         command.options.rbf.hull_near_widths = command.hull_fallback.front();
         command.options.rbf.hull_far_widths = command.hull_fallback.back();
     }
-    if (const std::string fault = fault_of_options(command.options, command.takes.size()); !fault.empty()) {
+    return fault_of_options(command.options, command.takes.size());
+}
+
+int run_train(TrainCommand& command) {
+    if (const std::string fault = fault_of_command(command); !fault.empty()) {
         print_error(fault);
         return kExitUsage;
     }
@@ -143,6 +251,13 @@ int run_train(TrainCommand& command) {
     if (const auto loaded = load_inputs(command, rig, layout); !loaded) {
         print_error(loaded.error().message);
         return kExitInput;
+    }
+    MarkerTake markers;
+    if (!command.markers.empty()) {
+        if (const auto told = estimate_noise(command, layout, markers); !told) {
+            print_error(told.error().message);
+            return kExitInput;
+        }
     }
     Progress bar("train", 1000);
     const auto pack = train(rig, layout, command.options, [&](double share) {
@@ -158,9 +273,27 @@ int run_train(TrainCommand& command) {
         print_error(saved.error().message);
         return kExitOutput;
     }
+    if (const auto written = write_reports(command, *pack); !written) {
+        print_error(written.error().message);
+        return kExitOutput;
+    }
     print_result(command, *pack);
+    if (!command.markers.empty()) print_residual(*pack, markers);
     print_warnings(*pack);
     return kExitOk;
+}
+
+CLI::Option* add_noise_options(CLI::App& verb, TrainCommand& command) {
+    CLI::Option* noise = verb.add_option("--noise-mm", command.options.noise_mm,
+                                         "standard deviation of one marker coordinate");
+    noise->capture_default_str()->type_name("MM");
+    verb.add_option("--markers", command.markers,
+                    "recorded markers (frames, markers, 3) .npy to estimate the noise from")
+        ->type_name("M.npy");
+    verb.add_option("--hold", command.hold,
+                    "frames of --markers in which the face holds still; END not included")
+        ->type_name("BEGIN:END");
+    return noise;
 }
 
 void add_rbf_options(CLI::App& verb, TrainCommand& command) {
@@ -211,9 +344,7 @@ void add_train_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--cameras", command->cameras,
                      "cameras.json of the helmet; without it the pack solves marker streams only")
         ->type_name("JSON");
-    verb->add_option("--noise-mm", command->options.noise_mm, "standard deviation of one marker coordinate")
-        ->capture_default_str()
-        ->type_name("MM");
+    CLI::Option* noise = add_noise_options(*verb, *command);
     verb->add_option("--rate", command->options.rate_hz, "frame rate it is for")
         ->capture_default_str()
         ->type_name("HZ");
@@ -241,6 +372,8 @@ void add_train_verb(CLI::App& app, int& exit_code) {
                      "examples of the face, the neutral one among them")
         ->capture_default_str()
         ->type_name("K");
+    verb->add_option("--report", command->report, "HTML page about the pack and its training")
+        ->type_name("HTML");
     verb->add_option("--name", command->name, "name inside the pack [the file's]")->type_name("NAME");
     verb->add_option("--pack-version", command->identity.pack_version, "version inside the pack")
         ->capture_default_str();
@@ -248,8 +381,14 @@ void add_train_verb(CLI::App& app, int& exit_code) {
     verb->footer(
         "Examples:\n  headrig train --rig sample --layout 60 --solver boxqp --cameras cameras.json --out "
         "face.pack\n"
-        "  headrig train --rig sample --solver rbf --take sample/take.csv --out rbf.pack");
-    verb->callback([command, &exit_code] { exit_code = run_train(*command); });
+        "  headrig train --rig sample --solver rbf --take sample/take.csv --out rbf.pack --report rbf.html\n"
+        "  headrig train --rig fitted --markers rom.npy --hold 0:60 --out face.pack\n"
+        "A regression also leaves what training saw beside the pack, NAME.training.csv, for `headrig "
+        "report`.");
+    verb->callback([command, noise, &exit_code] {
+        command->noise_given = noise->count() > 0;
+        exit_code = run_train(*command);
+    });
 }
 
 }  // namespace rig::host

@@ -8,9 +8,11 @@ void add_all_verbs(CLI::App& app, int& exit_code) {
     add_sample_verb(app, exit_code);
     add_import_verb(app, exit_code);
     add_world_verb(app, exit_code);
+    add_fit_verb(app, exit_code);
     add_train_verb(app, exit_code);
     add_keyshapes_verb(app, exit_code);
     add_pack_verb(app, exit_code);
+    add_report_verb(app, exit_code);
     add_solve_verb(app, exit_code);
     add_smooth_verb(app, exit_code);
     add_detect_verb(app, exit_code);

@@ -67,10 +67,10 @@ Result<ExperimentTable, FileError> chuang02_key_shapes(const std::filesystem::pa
     if (!head) return failure(head.error());
     ExperimentTable out;
     out.columns = {"take, region", "key shapes", "spread", "clusters, 2D", "clusters, 3D"};
-    const FaceRegion lips = lip_region(head->layout);
-    const std::vector<FaceRegion> features = feature_regions(head->layout);
-    const auto mouth = std::ranges::find(features, "mouth", &FaceRegion::name);
-    const auto motion_of = [&](const FaceRegion& region, const Take& take) {
+    const MarkerRegion lips = lip_region(head->layout);
+    const std::vector<MarkerRegion> features = feature_regions(head->layout);
+    const auto mouth = std::ranges::find(features, "mouth", &MarkerRegion::name);
+    const auto motion_of = [&](const MarkerRegion& region, const Take& take) {
         return region_motion(region, head->model.neutral_mm, head->model.basis_mm, std::span(&take, 1),
                              kImageAxes);
     };

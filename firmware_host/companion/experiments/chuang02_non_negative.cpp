@@ -60,10 +60,10 @@ Result<ExperimentTable, FileError> chuang02_non_negative(const std::filesystem::
     if (!head) return failure(head.error());
     ExperimentTable out;
     out.columns = {"region", "solver", "source, mm", "target, mm", "largest |w|"};
-    std::vector<FaceRegion> regions = feature_regions(head->layout);
-    std::erase_if(regions, [](const FaceRegion& region) { return region.name != "mouth"; });
+    std::vector<MarkerRegion> regions = feature_regions(head->layout);
+    std::erase_if(regions, [](const MarkerRegion& region) { return region.name != "mouth"; });
     regions.push_back(lip_region(head->layout));
-    for (const FaceRegion& region : regions) {
+    for (const MarkerRegion& region : regions) {
         const RegionMotion motion = region_motion(region, head->model.neutral_mm, head->model.basis_mm,
                                                   std::span(&head->range_of_motion, 1), kImageAxes);
         const KeyShapes shapes = choose_key_shapes(motion, KeyShapeMethod::kSpread, kShapes);

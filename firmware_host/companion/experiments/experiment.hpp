@@ -48,6 +48,7 @@ struct Experiment {
 [[nodiscard]] Result<ExperimentTable, FileError> deng06_mistracked(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> deng06_proportions(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> deng06_variance(const std::filesystem::path& data);
+[[nodiscard]] Result<ExperimentTable, FileError> hybrid16_barycentric(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> rbf_dimensions(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> temporal_prior(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> zhang06_regions(const std::filesystem::path& data);

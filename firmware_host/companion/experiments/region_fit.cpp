@@ -21,11 +21,11 @@ constexpr std::array<std::size_t, 3> kAllAxes{0, 1, 2};
 // Core's regional solver without a pack file. Not to be copied: the pack's spans point into the regions.
 class RegionSolve {
   public:
-    RegionSolve(const RecordedHead& head, const std::vector<FaceRegion>& plan, const MatrixXd& examples)
+    RegionSolve(const RecordedHead& head, const std::vector<MarkerRegion>& plan, const MatrixXd& examples)
         : seen_(head.layout.markers.size(), Mat3::Identity()),
           confidence_(static_cast<std::size_t>(examples.cols()), 1.0F),
           weights_(static_cast<std::size_t>(examples.cols())) {
-        for (const FaceRegion& region : plan) {
+        for (const MarkerRegion& region : plan) {
             regions_.push_back(region_of_examples(region, RegionSolver::kSimplex, head.model.neutral_mm,
                                                   head.model.basis_mm, examples));
             regions_.back().shape_blend.assign(weights_.size(), 0.0F);
@@ -88,8 +88,8 @@ MatrixXd face_examples(const RecordedHead& head, const Take& take, std::size_t c
     return examples;
 }
 
-RegionFit fit_regions(const RecordedHead& head, const std::vector<FaceRegion>& plan, const MatrixXd& examples,
-                      const Take& take) {
+RegionFit fit_regions(const RecordedHead& head, const std::vector<MarkerRegion>& plan,
+                      const MatrixXd& examples, const Take& take) {
     RegionSolve solver(head, plan, examples);
     RegionFit out;
     std::vector<Vec3> positions(head.layout.markers.size());

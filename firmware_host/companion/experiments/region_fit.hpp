@@ -20,7 +20,7 @@ struct RegionFit {
 };
 
 // Every frame of the take without noise. Markers that several regions share are blended as the regions say.
-[[nodiscard]] RegionFit fit_regions(const RecordedHead& head, const std::vector<FaceRegion>& plan,
+[[nodiscard]] RegionFit fit_regions(const RecordedHead& head, const std::vector<MarkerRegion>& plan,
                                     const Eigen::MatrixXd& examples, const Take& take);
 
 }  // namespace rig::host

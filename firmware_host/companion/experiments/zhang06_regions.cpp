@@ -27,8 +27,8 @@ Result<ExperimentTable, FileError> zhang06_regions(const std::filesystem::path& 
     const auto head = load_recorded_head(data, "102");
     if (!head) return failure(head.error());
     const Eigen::MatrixXd examples = face_examples(*head, head->range_of_motion, kExamples);
-    const std::vector<FaceRegion> face = whole_face(head->layout);
-    const std::vector<FaceRegion> surface = surface_regions(head->layout);
+    const std::vector<MarkerRegion> face = whole_face(head->layout);
+    const std::vector<MarkerRegion> surface = surface_regions(head->layout);
     ExperimentTable out;
     out.columns = {"take",      "regions",    "rms of a marker, mm", "of the whole face's",
                    "worst kkt", "uncertified"};

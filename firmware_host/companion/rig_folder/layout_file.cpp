@@ -26,6 +26,7 @@ struct LayoutColumns {
     Columns barycentric{};
     std::optional<Columns> neutral;
     Columns normal{};
+    std::optional<Columns> offset;
 };
 
 std::optional<std::size_t> find_column(const CsvReader& reader, std::string_view name) {
@@ -60,6 +61,11 @@ Result<LayoutColumns, FileError> find_columns(const CsvReader& reader) {
     const auto normal = find_three(reader, {"nx", "ny", "nz"});
     if (!normal) return failure(normal.error());
     columns.normal = *normal;
+    if (find_column(reader, "ox_mm")) {
+        const auto offset = find_three(reader, {"ox_mm", "oy_mm", "oz_mm"});
+        if (!offset) return failure(offset.error());
+        columns.offset = *offset;
+    }
     if (find_column(reader, "x_mm")) {
         const auto neutral = find_three(reader, {"x_mm", "y_mm", "z_mm"});
         if (!neutral) return failure(neutral.error());
@@ -123,6 +129,11 @@ Result<LayoutMarker, FileError> read_marker(const CsvReader& reader, const Layou
     const auto normal = read_three(reader, columns.normal);
     if (!normal) return failure(normal.error());
     marker.normal = *normal;
+    if (columns.offset) {
+        const auto offset = read_three(reader, *columns.offset);
+        if (!offset) return failure(offset.error());
+        marker.offset_mm = *offset;
+    }
     marker.neutral_mm = surface_point(marker, rig);
     if (!columns.neutral) return marker;
     const auto neutral = read_three(reader, *columns.neutral);
@@ -144,8 +155,13 @@ double rms_motion_mm(const MarkerModel& model, std::size_t marker, std::size_t s
 }
 
 std::string layout_text(const MarkerLayout& layout, const MarkerModel& model, std::size_t shape_count) {
-    CsvWriter csv{{"marker", "name", "v0", "v1", "v2", "b0", "b1", "b2", "x_mm", "y_mm", "z_mm", "nx", "ny",
-                   "nz", "rms_mm"}};
+    // Layouts without offsets are the rule and keep the columns that other programs know.
+    const bool offsets = std::ranges::any_of(
+        layout.markers, [](const LayoutMarker& marker) { return marker.offset_mm != Float3{}; });
+    std::vector<std::string> columns{"marker", "name", "v0",   "v1", "v2", "b0", "b1",    "b2",
+                                     "x_mm",   "y_mm", "z_mm", "nx", "ny", "nz", "rms_mm"};
+    if (offsets) columns.insert(columns.end(), {"ox_mm", "oy_mm", "oz_mm"});
+    CsvWriter csv{columns};
     for (std::size_t m = 0; m < layout.markers.size(); ++m) {
         const LayoutMarker& marker = layout.markers[m];
         csv.integer(static_cast<std::int64_t>(m)).text(marker.name);
@@ -153,7 +169,11 @@ std::string layout_text(const MarkerLayout& layout, const MarkerModel& model, st
         for (const float share : marker.barycentric) csv.number(static_cast<double>(share), 6);
         for (const float x_mm : marker.neutral_mm) csv.number(static_cast<double>(x_mm), 4);
         for (const float n : marker.normal) csv.number(static_cast<double>(n), 4);
-        csv.number(rms_motion_mm(model, m, shape_count), 4).end_row();
+        csv.number(rms_motion_mm(model, m, shape_count), 4);
+        if (offsets) {
+            for (const float o_mm : marker.offset_mm) csv.number(static_cast<double>(o_mm), 4);
+        }
+        csv.end_row();
     }
     return csv.contents();
 }

@@ -41,27 +41,6 @@ Result<ListColumns, FileError> find_columns(const CsvReader& reader) {
     return columns;
 }
 
-// Neutral position and normal follow from where on the mesh the marker sits.
-bool complete(LayoutMarker& marker, const Rig& rig, const std::vector<Double3>& normals) {
-    Double3 normal{};
-    Double3 point{};
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-        const auto v = static_cast<std::size_t>(marker.vertices[corner]);
-        const auto share = static_cast<double>(marker.barycentric[corner]);
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            normal[axis] += share * normals[v][axis];
-            point[axis] += share * static_cast<double>(rig.vertices_mm[v][axis]);
-        }
-    }
-    const double length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
-    if (!(length > 1.0e-6)) return false;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        marker.normal[axis] = static_cast<float>(normal[axis] / length);
-        marker.neutral_mm[axis] = static_cast<float>(point[axis]);
-    }
-    return true;
-}
-
 Result<void, FileError> place_on_vertex(const CsvReader& reader, std::size_t column, const Rig& rig,
                                         LayoutMarker& marker) {
     const auto index = reader.integer(column);
@@ -104,7 +83,7 @@ Result<LayoutMarker, FileError> read_marker(const CsvReader& reader, const ListC
     const auto placed = by_vertex ? place_on_vertex(reader, *columns.vertex, rig, marker)
                                   : place_on_surface(reader, *columns.point, rig, mm_per_unit, marker);
     if (!placed) return failure(placed.error());
-    if (!complete(marker, rig, normals)) {
+    if (!settle_on_mesh(rig, normals, marker)) {
         return reader.fail(
             fmt::format("marker '{}' has no normal: no face with an area is there", printable(marker.name)));
     }

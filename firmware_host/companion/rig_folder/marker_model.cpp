@@ -51,6 +51,10 @@ MarkerModel marker_model(const Rig& rig, const MarkerLayout& layout) {
     const CornersByVertex corners{layout, rig.vertices_mm.size()};
     std::vector<double> neutral(rows, 0.0);
     std::vector<double> basis(rows * shape_count, 0.0);
+    for (std::size_t m = 0; m < layout.markers.size(); ++m) {
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            neutral[3 * m + axis] = static_cast<double>(layout.markers[m].offset_mm[axis]);
+    }
     for (std::size_t v = 0; v < rig.vertices_mm.size(); ++v) {
         for (const Corner& corner : corners.of(v)) {
             for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -48,6 +48,10 @@ Result<void, FileError> check_marker(const std::filesystem::path& where, const L
                 "its neutral position is not where vertices and weights put it (a layout of another head?)");
         }
     }
+    for (const float offset : marker.offset_mm) {
+        if (!(std::abs(offset) <= kMaxOffsetMm))
+            return fail(fmt::format("its offset is not a number up to {} mm", kMaxOffsetMm));
+    }
     const Float3& n = marker.normal;
     const float length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     if (!(std::abs(length - 1.0F) <= kNormalTolerance)) return fail("its normal is not of unit length");

@@ -10,7 +10,8 @@
 namespace rig::host {
 
 inline constexpr std::size_t kMaxVertices = std::size_t{1} << 22;  // film heads stay under a million
-inline constexpr float kMaxCoordinateMm = 1.0e5F;                  // 100 m: anything beyond is a wrong unit
+inline constexpr float kMaxOffsetMm = 20.0F;  // of a marker from its surface point: more is another place
+inline constexpr float kMaxCoordinateMm = 1.0e5F;  // 100 m: anything beyond is a wrong unit
 
 // Not empty, at most kMaxNameBytes, printable, no comma, quote or blank at either end: it has to survive CSV
 // headers.

@@ -27,8 +27,9 @@ struct LayoutMarker {
     std::string name;
     Int3 vertices{};
     Float3 barycentric{};  // sums to 1
-    Float3 neutral_mm{};
-    Float3 normal{};  // outward, unit
+    Float3 neutral_mm{};   // of the surface point, on the mesh
+    Float3 normal{};       // outward, unit
+    Float3 offset_mm{};    // of the marker from its surface point, along the face's axes in every expression
 };
 
 struct MarkerLayout {
@@ -63,7 +64,7 @@ struct Take {
 [[nodiscard]] Result<void, FileError> save_layout(const std::filesystem::path& folder,
                                                   const MarkerLayout& layout, const Rig& rig);
 
-// b0 [3m] and B [3m x N] row-major of a layout, computed from mesh and shapes.
+// b0 [3m] and B [3m x N] row-major of a layout, computed from mesh and shapes; b0 with the offsets.
 struct MarkerModel {
     std::vector<float> neutral_mm;
     std::vector<float> basis_mm;

@@ -1,7 +1,9 @@
 #include "firmware_host/companion/rig_folder/surface.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace rig::host {
 
@@ -95,6 +97,22 @@ SurfacePoint nearest_surface_point(const Rig& rig, const Double3& point_mm) {
     return best;
 }
 
+std::vector<SurfacePoint> nearest_triangles(const Rig& rig, const Double3& point_mm, std::size_t count,
+                                            const std::vector<std::uint8_t>& parts) {
+    std::vector<SurfacePoint> all;
+    for (std::size_t t = 0; t < rig.triangles.size(); ++t) {
+        if (!parts.empty() && std::ranges::find(parts, rig.triangle_part[t]) == parts.end()) continue;
+        const Triangle corners = corners_of(rig, t);
+        const Double3 share = nearest_share(corners, point_mm);
+        all.push_back({t, share, std::sqrt(distance2_at(corners, share, point_mm))});
+    }
+    const auto kept = all.begin() + static_cast<std::ptrdiff_t>(std::min(count, all.size()));
+    std::ranges::partial_sort(all, kept, {},
+                              [](const SurfacePoint& p) { return std::pair{p.distance_mm, p.triangle}; });
+    all.erase(kept, all.end());
+    return all;
+}
+
 std::vector<Double3> vertex_normals(const Rig& rig) {
     std::vector<Double3> normals(rig.vertices_mm.size(), Double3{});
     for (std::size_t t = 0; t < rig.triangles.size(); ++t) {
@@ -111,6 +129,26 @@ std::vector<Double3> vertex_normals(const Rig& rig) {
         for (double& x : normal) x /= length;
     }
     return normals;
+}
+
+bool settle_on_mesh(const Rig& rig, const std::vector<Double3>& normals, LayoutMarker& marker) {
+    Double3 normal{};
+    Double3 point{};
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+        const auto v = static_cast<std::size_t>(marker.vertices[corner]);
+        const auto share = static_cast<double>(marker.barycentric[corner]);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            normal[axis] += share * normals[v][axis];
+            point[axis] += share * static_cast<double>(rig.vertices_mm[v][axis]);
+        }
+    }
+    const double length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    if (!(length > 1.0e-6)) return false;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        marker.normal[axis] = static_cast<float>(normal[axis] / length);
+        marker.neutral_mm[axis] = static_cast<float>(point[axis]);
+    }
+    return true;
 }
 
 }  // namespace rig::host

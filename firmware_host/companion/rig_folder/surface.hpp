@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "firmware_host/companion/rig_folder/rig_folder.hpp"
@@ -21,8 +22,18 @@ struct SurfacePoint {
 // triangles.
 [[nodiscard]] SurfacePoint nearest_surface_point(const Rig& rig, const Double3& point_mm);
 
+// The `count` triangles of the listed parts (all parts where the list is empty) nearest to `point_mm`,
+// nearest first, ties by index; fewer when there are not as many.
+[[nodiscard]] std::vector<SurfacePoint> nearest_triangles(const Rig& rig, const Double3& point_mm,
+                                                          std::size_t count,
+                                                          const std::vector<std::uint8_t>& parts);
+
 // Unit, outward where triangles run counter-clockwise, weighted by area; zero for vertices without a
 // triangle.
 [[nodiscard]] std::vector<Double3> vertex_normals(const Rig& rig);
+
+// Writes a marker's neutral position and normal from its vertices and weights; `normals` as above. False when
+// there is no normal: no face with an area is there.
+[[nodiscard]] bool settle_on_mesh(const Rig& rig, const std::vector<Double3>& normals, LayoutMarker& marker);
 
 }  // namespace rig::host

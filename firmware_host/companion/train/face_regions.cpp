@@ -61,14 +61,14 @@ bool is_pupil(const LayoutMarker& marker) {
     return name.find("pupil") != std::string::npos || name.find("iris") != std::string::npos;
 }
 
-void add(FaceRegion& region, std::size_t marker, double blend) {
+void add(MarkerRegion& region, std::size_t marker, double blend) {
     if (!(blend > 0.0)) return;
     region.markers.push_back(static_cast<std::uint16_t>(marker));
     region.blend.push_back(blend);
 }
 
-void drop_empty(std::vector<FaceRegion>& regions) {
-    std::erase_if(regions, [](const FaceRegion& region) { return region.markers.empty(); });
+void drop_empty(std::vector<MarkerRegion>& regions) {
+    std::erase_if(regions, [](const MarkerRegion& region) { return region.markers.empty(); });
 }
 
 std::vector<double> distances_mm(const LayoutMarker& marker, const std::vector<Anchor>& anchors,
@@ -100,9 +100,9 @@ std::vector<Anchor> anchors_with_markers(const MarkerLayout& layout, const Exten
 
 }  // namespace
 
-std::vector<FaceRegion> feature_regions(const MarkerLayout& layout) {
+std::vector<MarkerRegion> feature_regions(const MarkerLayout& layout) {
     const Extent extent = extent_of(layout);
-    std::vector<FaceRegion> regions(3);
+    std::vector<MarkerRegion> regions(3);
     regions[0].name = "eyes";
     regions[1].name = "mouth";
     regions[2].name = "pupils";
@@ -121,10 +121,10 @@ std::vector<FaceRegion> feature_regions(const MarkerLayout& layout) {
     return regions;
 }
 
-std::vector<FaceRegion> surface_regions(const MarkerLayout& layout) {
+std::vector<MarkerRegion> surface_regions(const MarkerLayout& layout) {
     const Extent extent = extent_of(layout);
     const std::vector<Anchor> anchors = anchors_with_markers(layout, extent);
-    std::vector<FaceRegion> regions(anchors.size());
+    std::vector<MarkerRegion> regions(anchors.size());
     for (std::size_t a = 0; a < anchors.size(); ++a) regions[a].name = anchors[a].name;
     const double border_mm = kBorderShare * extent.depth_mm;
     for (std::size_t k = 0; k < layout.markers.size(); ++k) {
@@ -141,27 +141,27 @@ std::vector<FaceRegion> surface_regions(const MarkerLayout& layout) {
     return regions;
 }
 
-FaceRegion lip_region(const MarkerLayout& layout) {
+MarkerRegion lip_region(const MarkerLayout& layout) {
     std::vector<double> share(layout.markers.size(), 0.0);
-    for (const FaceRegion& region : surface_regions(layout)) {
+    for (const MarkerRegion& region : surface_regions(layout)) {
         if (!region.name.ends_with("lip") && !region.name.ends_with("corner")) continue;
         for (std::size_t a = 0; a < region.markers.size(); ++a) share[region.markers[a]] += region.blend[a];
     }
-    FaceRegion lips{"lips", {}, {}};
+    MarkerRegion lips{"lips", {}, {}};
     for (std::size_t k = 0; k < share.size(); ++k) {
         if (share[k] > 0.5) add(lips, k, 1.0);
     }
     return lips;
 }
 
-std::vector<FaceRegion> whole_face(const MarkerLayout& layout) {
-    std::vector<FaceRegion> regions(1);
+std::vector<MarkerRegion> whole_face(const MarkerLayout& layout) {
+    std::vector<MarkerRegion> regions(1);
     regions[0].name = "face";
     for (std::size_t k = 0; k < layout.markers.size(); ++k) add(regions[0], k, 1.0);
     return regions;
 }
 
-std::vector<double> shape_shares(std::span<const FaceRegion> regions, std::span<const float> basis_mm,
+std::vector<double> shape_shares(std::span<const MarkerRegion> regions, std::span<const float> basis_mm,
                                  std::size_t shape_count) {
     std::vector<double> shares(regions.size() * shape_count, 0.0);
     const auto normalise = [&](std::size_t i, double least) {

@@ -161,7 +161,7 @@ std::string_view key_shape_method_name(KeyShapeMethod method) {
     return kNames[static_cast<std::size_t>(method)];
 }
 
-RegionMotion region_motion(const FaceRegion& region, std::span<const float> neutral_mm,
+RegionMotion region_motion(const MarkerRegion& region, std::span<const float> neutral_mm,
                            std::span<const float> basis_mm, std::span<const Take> takes,
                            std::span<const std::size_t> axes) {
     const std::size_t n = basis_mm.size() / neutral_mm.size();

@@ -34,7 +34,7 @@ struct RegionMotion {
 
 // Motion of the region's markers over all frames of the takes, of the axes named: {0, 1, 2}, or {0, 1} for
 // what a camera in front sees [Chuang02].
-[[nodiscard]] RegionMotion region_motion(const FaceRegion& region, std::span<const float> neutral_mm,
+[[nodiscard]] RegionMotion region_motion(const MarkerRegion& region, std::span<const float> neutral_mm,
                                          std::span<const float> basis_mm, std::span<const Take> takes,
                                          std::span<const std::size_t> axes);
 

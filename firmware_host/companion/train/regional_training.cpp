@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 constexpr std::array<std::size_t, 3> kAllAxes{0, 1, 2};
 
 // Absolute positions [R x k] of the region's markers at these weights.
-MatrixXd example_positions(const FaceRegion& region, std::span<const float> neutral_mm,
+MatrixXd example_positions(const MarkerRegion& region, std::span<const float> neutral_mm,
                            std::span<const float> basis_mm, const MatrixXd& weights) {
     const auto n = static_cast<std::size_t>(weights.cols());
     MatrixXd out(static_cast<Index>(3 * region.markers.size()), weights.rows());
@@ -38,7 +38,7 @@ MatrixXd example_positions(const FaceRegion& region, std::span<const float> neut
 }
 
 // What both solvers measure from: the neutral centroid for every marker, or the mean example [R].
-VectorXd origin_of(const FaceRegion& region, RegionSolver solver, std::span<const float> neutral_mm,
+VectorXd origin_of(const MarkerRegion& region, RegionSolver solver, std::span<const float> neutral_mm,
                    const MatrixXd& positions) {
     if (solver == RegionSolver::kSimplex) return positions.rowwise().mean();
     VectorXd origin = VectorXd::Zero(positions.rows());
@@ -81,7 +81,7 @@ std::vector<Index> example_frames(const RegionMotion& face, std::size_t count) {
     return choose_key_shapes(face, KeyShapeMethod::kSpread, count).frames;
 }
 
-TrainedRegion region_of_examples(const FaceRegion& region, RegionSolver solver,
+TrainedRegion region_of_examples(const MarkerRegion& region, RegionSolver solver,
                                  std::span<const float> neutral_mm, std::span<const float> basis_mm,
                                  const MatrixXd& example_weights) {
     const MatrixXd positions = example_positions(region, neutral_mm, basis_mm, example_weights);
@@ -120,7 +120,7 @@ Result<std::vector<TrainedRegion>, FileError> train_regions(SolverKind solver, c
     for (const Take& take : takes) frames += take.frame_count;
     if (frames < 2) return failure(FileError{"the takes have fewer than two frames to choose from"});
     const bool by_examples = solver == SolverKind::kExamples;
-    const std::vector<FaceRegion> plan = by_examples ? surface_regions(layout) : feature_regions(layout);
+    const std::vector<MarkerRegion> plan = by_examples ? surface_regions(layout) : feature_regions(layout);
     if (plan.empty() || plan.size() > kMaxRegions)
         return failure(FileError{"the layout has no markers that a region could be made of"});
     const std::size_t n = basis_mm.size() / neutral_mm.size();

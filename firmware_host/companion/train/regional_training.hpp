@@ -38,7 +38,7 @@ struct TrainedRegion {
 [[nodiscard]] std::vector<Eigen::Index> example_frames(const RegionMotion& face, std::size_t count);
 
 // A region whose examples are these streamed weights [k x N] on the rig.
-[[nodiscard]] TrainedRegion region_of_examples(const FaceRegion& region, RegionSolver solver,
+[[nodiscard]] TrainedRegion region_of_examples(const MarkerRegion& region, RegionSolver solver,
                                                std::span<const float> neutral_mm,
                                                std::span<const float> basis_mm,
                                                const Eigen::MatrixXd& example_weights);

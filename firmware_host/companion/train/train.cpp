@@ -176,6 +176,8 @@ Result<TrainedPack, FileError> train(const Rig& rig, const MarkerLayout& layout,
         if (!trained) return failure(trained.error());
         pack.rbf = std::move(trained->model);
         pack.report.rbf = trained->report;
+        pack.report.coverage =
+            coverage_of_takes(pack.view().rbf, pack.neutral_mm, pack.basis_mm, options.takes);
     }
     if (is_regional(options.solver)) {
         auto regions = train_regions(options.solver, layout, pack.neutral_mm, pack.basis_mm, options.takes,

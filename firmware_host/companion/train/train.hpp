@@ -11,6 +11,7 @@
 #include "core/pack/solve_pack.hpp"
 #include "firmware_host/companion/files/file_error.hpp"
 #include "firmware_host/companion/rig_folder/rig_folder.hpp"
+#include "firmware_host/companion/train/coverage.hpp"
 #include "firmware_host/companion/train/rbf_training.hpp"
 #include "firmware_host/companion/train/regional_training.hpp"
 
@@ -58,6 +59,7 @@ struct TrainReport {
     double condition = 0.0;  // largest over smallest singular value that counts towards the rank
     std::vector<InvisibleShape> invisible;
     std::optional<RbfTrainingReport> rbf;
+    std::optional<Coverage> coverage;  // of the takes by the RBF's references
 };
 
 // Owns the numbers of a pack. Moving keeps views valid; copying is not allowed.

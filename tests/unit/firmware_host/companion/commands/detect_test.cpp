@@ -1,9 +1,7 @@
 // The verb as a script meets it: rows on standard output, errors by file, exit codes.
 #include <gtest/gtest.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -14,35 +12,16 @@
 #include "firmware_host/companion/files/image_file.hpp"
 #include "tests/support/dot_scene/dot_scene.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/firmware_host/companion/commands/verb_run.hpp"
 
 namespace {
 
 using namespace rig;
 namespace fs = std::filesystem;
 
-struct Outcome {
-    int exit_code = -1;
-    std::string out;
-    std::string err;
-};
-
-Outcome run(std::vector<std::string> arguments) {
-    CLI::App app;
-    Outcome outcome;
-    host::add_detect_verb(app, outcome.exit_code);
+test::VerbOutcome run(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "detect");
-    std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
-    try {
-        app.parse(arguments);
-    } catch (const CLI::ParseError& error) {
-        outcome.exit_code = error.get_exit_code() == 0 ? 0 : host::kExitUsage;
-    }
-    std::fflush(nullptr);
-    outcome.out = testing::internal::GetCapturedStdout();
-    outcome.err = testing::internal::GetCapturedStderr();
-    return outcome;
+    return test::run_verb(host::add_detect_verb, std::move(arguments));
 }
 
 std::vector<std::string> lines_with(const std::string& text, const std::string& start) {
@@ -68,7 +47,7 @@ constexpr const char* kHeader = "image,x_px,y_px,diameter_px,contrast,score";
 
 TEST_F(DetectVerb, RowsHaveTheImagesStemAndSixFields) {
     const fs::path dark = write("dark.pgm", test::lattice_scene(10, 2, false, 1));
-    const Outcome outcome = run({dark.string()});
+    const test::VerbOutcome outcome = run({dark.string()});
     EXPECT_EQ(outcome.exit_code, host::kExitOk) << outcome.err;
     EXPECT_TRUE(outcome.out.starts_with(std::string(kHeader) + "\n"));
     const auto rows = lines_with(outcome.out, "dark,");
@@ -93,7 +72,7 @@ TEST_F(DetectVerb, BadFilesAreNamedAndTheOthersStillDone) {
     const fs::path text = folder.path() / "text.png";
     std::ofstream(text) << "this is no picture";
     const fs::path missing = folder.path() / "missing.jpg";
-    const Outcome outcome = run({cut.string(), text.string(), missing.string(), good.string()});
+    const test::VerbOutcome outcome = run({cut.string(), text.string(), missing.string(), good.string()});
     EXPECT_EQ(outcome.exit_code, host::kExitInput);
     for (const char* name : {"cut.pgm", "text.png", "missing.jpg"})
         EXPECT_NE(outcome.err.find(name), std::string::npos) << outcome.err;
@@ -104,7 +83,7 @@ TEST_F(DetectVerb, TooLargeAPictureIsAnErrorThatSaysTheLimit) {
     test::Picture large{2000, 8, std::vector<std::uint8_t>(16000, 50)};
     const fs::path path = folder.path() / "large.pgm";
     ASSERT_TRUE(host::write_grey_image(path, large.view()));
-    const Outcome outcome = run({path.string()});
+    const test::VerbOutcome outcome = run({path.string()});
     EXPECT_EQ(outcome.exit_code, host::kExitInput);
     EXPECT_NE(outcome.err.find("1920"), std::string::npos) << outcome.err;
 }

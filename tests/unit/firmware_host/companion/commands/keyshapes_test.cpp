@@ -1,8 +1,6 @@
 // The verb as a script meets it: files, the table, exit codes.
 #include <gtest/gtest.h>
 
-#include <CLI/CLI.hpp>
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -11,17 +9,13 @@
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/sample/sample.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/firmware_host/companion/commands/verb_run.hpp"
 
 namespace {
 
 using namespace rig;
+using test::VerbOutcome;
 namespace fs = std::filesystem;
-
-struct Outcome {
-    int exit_code = -1;
-    std::string out;
-    std::string err;
-};
 
 class KeyShapesVerb : public testing::Test {
   protected:
@@ -30,25 +24,12 @@ class KeyShapesVerb : public testing::Test {
     fs::path rig() const { return folder.path() / "sample"; }
     fs::path keys() const { return folder.path() / "keys"; }
 
-    Outcome run(const std::vector<std::string>& more) const {
-        CLI::App app;
-        Outcome outcome;
-        host::add_keyshapes_verb(app, outcome.exit_code);
+    VerbOutcome run(const std::vector<std::string>& more) const {
         std::vector<std::string> arguments{
             "keyshapes", "--rig",        rig().string(), "--take", (rig() / "take.csv").string(),
             "--out",     keys().string()};
         arguments.insert(arguments.end(), more.begin(), more.end());
-        std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
-        testing::internal::CaptureStdout();
-        testing::internal::CaptureStderr();
-        try {
-            app.parse(arguments);
-        } catch (const CLI::ParseError&) {
-            outcome.exit_code = host::kExitUsage;
-        }
-        outcome.out = testing::internal::GetCapturedStdout();
-        outcome.err = testing::internal::GetCapturedStderr();
-        return outcome;
+        return test::run_verb(host::add_keyshapes_verb, std::move(arguments));
     }
 
     std::size_t lines_of(const char* name) const {
@@ -62,7 +43,7 @@ class KeyShapesVerb : public testing::Test {
 };
 
 TEST_F(KeyShapesVerb, WritesShapesTableAndPicture) {
-    const Outcome outcome = run({"--method", "spread", "--count", "6", "--most", "8", "--axes", "xy"});
+    const VerbOutcome outcome = run({"--method", "spread", "--count", "6", "--most", "8", "--axes", "xy"});
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
     EXPECT_NE(outcome.out.find("6 key shapes of 1200 frames"), std::string::npos) << outcome.out;
     EXPECT_EQ(lines_of("key_shapes.csv"), 1U + 6U);
@@ -72,10 +53,10 @@ TEST_F(KeyShapesVerb, WritesShapesTableAndPicture) {
 }
 
 TEST_F(KeyShapesVerb, SaysWhichMethodsAndRegionsThereAre) {
-    const Outcome method = run({"--method", "guess"});
+    const VerbOutcome method = run({"--method", "guess"});
     EXPECT_EQ(method.exit_code, host::kExitUsage);
     EXPECT_NE(method.err.find("spread, clusters2, clusters3 or hull"), std::string::npos) << method.err;
-    const Outcome region = run({"--region", "ear"});
+    const VerbOutcome region = run({"--region", "ear"});
     EXPECT_EQ(region.exit_code, host::kExitUsage);
     EXPECT_NE(region.err.find("eyes mouth"), std::string::npos) << region.err;
     EXPECT_FALSE(fs::exists(keys()));

@@ -37,7 +37,7 @@ TEST(FitRegions, FindsTheExamplesThemselvesAndWhatIsBetweenTwo) {
             j < 8 ? Eigen::RowVectorXd(examples.row(j)) : 0.5 * (examples.row(2) + examples.row(5));
         for (const double w : weights) take.weights.push_back(static_cast<float>(w));
     }
-    for (const std::vector<FaceRegion>& plan : {whole_face(head.layout), surface_regions(head.layout)}) {
+    for (const std::vector<MarkerRegion>& plan : {whole_face(head.layout), surface_regions(head.layout)}) {
         const RegionFit fit = fit_regions(head, plan, examples, take);
         EXPECT_LT(fit.marker_rms_mm, 1e-3);
         EXPECT_EQ(fit.uncertified, 0U);

@@ -52,6 +52,32 @@ TEST(Layout, NumberAndPositionColumnsMayBeAbsent) {
     EXPECT_FLOAT_EQ(layout->markers[0].neutral_mm[0], 5.0F);
 }
 
+TEST(Layout, OffsetsAreColumnsOfTheirOwn) {
+    const rig::test::TempFolder folder;
+    const Rig rig = rig::test::small_rig();
+    MarkerLayout layout = rig::test::small_layout(rig);
+    ASSERT_TRUE(save_layout(folder.path(), layout, rig));
+    const auto plain = read_whole_text(folder / "markers_5.csv");
+    ASSERT_TRUE(plain);
+    EXPECT_EQ(plain->find("ox_mm"), std::string::npos);
+    const MarkerModel before = marker_model(rig, layout);
+    layout.markers[2].offset_mm = {0.5F, -1.25F, 2.0F};
+    ASSERT_TRUE(save_layout(folder.path(), layout, rig));
+    const auto back = load_layout(folder.path(), "5", rig);
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(back->markers[2].offset_mm, layout.markers[2].offset_mm);
+    EXPECT_EQ(back->markers[1].offset_mm, Float3{});
+    EXPECT_EQ(back->markers[2].neutral_mm, layout.markers[2].neutral_mm);
+    const MarkerModel after = marker_model(rig, *back);
+    EXPECT_EQ(after.basis_mm, before.basis_mm);
+    EXPECT_FLOAT_EQ(after.neutral_mm[7], before.neutral_mm[7] - 1.25F);
+    EXPECT_EQ(after.neutral_mm[3], before.neutral_mm[3]);
+    layout.markers[2].offset_mm = {0.0F, 0.0F, 25.0F};
+    const auto far = save_layout(folder.path(), layout, rig);
+    ASSERT_FALSE(far);
+    EXPECT_NE(far.error().message.find("offset"), std::string::npos);
+}
+
 struct BadLayout {
     std::string label;
     std::string text;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/unit/firmware_host/companion/rig_folder/small_rig.hpp"
@@ -37,6 +38,23 @@ TEST(Surface, TrianglesWithoutAreaStillHaveANearestPoint) {
     EXPECT_NEAR(nearest_surface_point(rig, {6, 3, 0}).distance_mm, 3.0, 1e-12);
     rig.vertices_mm[1] = rig.vertices_mm[2] = {0, 0, 0};
     EXPECT_NEAR(nearest_surface_point(rig, {0, 3, 4}).distance_mm, 5.0, 1e-12);
+}
+
+TEST(Surface, NearestTrianglesComeInOrderAndOfTheirParts) {
+    Rig rig = rig::test::small_rig();
+    const Double3 point{4, 7, 9};
+    const auto all = nearest_triangles(rig, point, 1000, {});
+    ASSERT_EQ(all.size(), rig.triangles.size());
+    for (std::size_t i = 1; i < all.size(); ++i) EXPECT_LE(all[i - 1].distance_mm, all[i].distance_mm);
+    const SurfacePoint nearest = nearest_surface_point(rig, point);
+    EXPECT_EQ(all.front().triangle, nearest.triangle);
+    EXPECT_EQ(all.front().barycentric, nearest.barycentric);
+    EXPECT_EQ(all.front().distance_mm, nearest.distance_mm);
+    EXPECT_EQ(nearest_triangles(rig, point, 3, {}).size(), 3U);
+    const auto part = nearest_triangles(rig, point, 1000, {1});
+    EXPECT_EQ(static_cast<std::ptrdiff_t>(part.size()), std::ranges::count(rig.triangle_part, 1));
+    for (const SurfacePoint& each : part) EXPECT_EQ(rig.triangle_part[each.triangle], 1);
+    EXPECT_TRUE(nearest_triangles(rig, point, 5, {200}).empty());
 }
 
 TEST(Surface, NormalsAreUnitAndOutward) {

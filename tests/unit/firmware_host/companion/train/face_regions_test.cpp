@@ -12,9 +12,9 @@ namespace rig::host {
 namespace {
 
 // Every marker in at most two regions, with blends that sum to 1.
-void expect_partition(const std::vector<FaceRegion>& regions, std::size_t markers) {
+void expect_partition(const std::vector<MarkerRegion>& regions, std::size_t markers) {
     std::map<std::uint16_t, double> sum;
-    for (const FaceRegion& region : regions) {
+    for (const MarkerRegion& region : regions) {
         ASSERT_FALSE(region.markers.empty()) << region.name;
         ASSERT_EQ(region.markers.size(), region.blend.size());
         for (std::size_t a = 0; a < region.markers.size(); ++a) {
@@ -32,7 +32,7 @@ void expect_partition(const std::vector<FaceRegion>& regions, std::size_t marker
 TEST(FaceRegions, FeaturesAreEyesAndMouthWithABandBetween) {
     const Rig rig = sample_rig();
     const MarkerLayout layout = sample_layout(rig);
-    const std::vector<FaceRegion> regions = feature_regions(layout);
+    const std::vector<MarkerRegion> regions = feature_regions(layout);
     ASSERT_EQ(regions.size(), 2U);
     EXPECT_EQ(regions[0].name, "eyes");
     EXPECT_EQ(regions[1].name, "mouth");
@@ -53,7 +53,7 @@ TEST(FaceRegions, MarkersNamedPupilAreARegionOfTheirOwn) {
     MarkerLayout layout = sample_layout(sample_rig());
     layout.markers[3].name = "L_Pupil";
     layout.markers[9].name = "right iris";
-    const std::vector<FaceRegion> regions = feature_regions(layout);
+    const std::vector<MarkerRegion> regions = feature_regions(layout);
     ASSERT_EQ(regions.size(), 3U);
     EXPECT_EQ(regions[2].name, "pupils");
     EXPECT_EQ(regions[2].markers, (std::vector<std::uint16_t>{3, 9}));
@@ -67,12 +67,12 @@ TEST(FaceRegions, TheSurfaceHasUpTo14SymmetricRegions) {
     for (const char* name : {"50", "60", "102"}) {
         const auto layout = load_layout(folder, name, *rig);
         ASSERT_TRUE(layout.has_value());
-        const std::vector<FaceRegion> regions = surface_regions(*layout);
+        const std::vector<MarkerRegion> regions = surface_regions(*layout);
         EXPECT_LE(regions.size(), 14U);
         EXPECT_GE(regions.size(), 8U) << name;
         expect_partition(regions, layout->markers.size());
         std::map<std::string, std::size_t> size;
-        for (const FaceRegion& region : regions) size[region.name] = region.markers.size();
+        for (const MarkerRegion& region : regions) size[region.name] = region.markers.size();
         EXPECT_EQ(size["left_cheek"], size["right_cheek"]);
         EXPECT_EQ(size["left_corner"], size["right_corner"]);
         if (std::string(name) == "102") {
@@ -90,7 +90,7 @@ TEST(FaceRegions, BlendsAreContinuous) {
     ASSERT_TRUE(layout.has_value());
     const auto blends = [&] {
         std::map<std::string, double> out;
-        for (const FaceRegion& region : surface_regions(*layout)) {
+        for (const MarkerRegion& region : surface_regions(*layout)) {
             for (std::size_t a = 0; a < region.markers.size(); ++a) {
                 if (region.markers[a] == 2) out[region.name] = region.blend[a];
             }
@@ -117,7 +117,7 @@ TEST(FaceRegions, LipsAreAroundTheMouth) {
     ASSERT_TRUE(rig.has_value());
     const auto layout = load_layout(folder, "102", *rig);
     ASSERT_TRUE(layout.has_value());
-    const FaceRegion lips = lip_region(*layout);
+    const MarkerRegion lips = lip_region(*layout);
     EXPECT_GE(lips.markers.size(), 12U);
     EXPECT_LE(lips.markers.size(), 30U);
     std::set<std::string> names;
@@ -131,7 +131,7 @@ TEST(FaceRegions, LipsAreAroundTheMouth) {
 TEST(FaceRegions, AFewMarkersMakeFewRegions) {
     MarkerLayout layout = sample_layout(sample_rig());
     layout.markers.resize(4);
-    const std::vector<FaceRegion> regions = surface_regions(layout);
+    const std::vector<MarkerRegion> regions = surface_regions(layout);
     EXPECT_GE(regions.size(), 1U);
     EXPECT_LE(regions.size(), 2U);
     expect_partition(regions, 4);
@@ -141,7 +141,7 @@ TEST(FaceRegions, AFewMarkersMakeFewRegions) {
 TEST(FaceRegions, SharesFollowTheMotion) {
     // Two regions of one marker each; shape 0 moves the first, shape 1 both alike, shape 2 none, shape 3 the
     // second a hundred times as much as the first.
-    std::vector<FaceRegion> regions(2);
+    std::vector<MarkerRegion> regions(2);
     regions[0] = {"a", {0}, {1.0}};
     regions[1] = {"b", {1}, {1.0}};
     std::vector<float> basis(6 * 4, 0.0F);
