@@ -18,7 +18,9 @@ inline constexpr std::size_t kMaxPoints = 256;        // unlabelled 3D points of
 inline constexpr std::size_t kMaxModes = 48;          // shape-space dimensions of tracker and stabiliser
 inline constexpr std::size_t kMaxRbfCentres = 256;    // reference frames of one pack; the sources use 100
 inline constexpr std::size_t kMaxRbfDimensions = 32;  // principal components kept; the sources use 4 to 20
-inline constexpr std::size_t kMaxWindowFrames = 61;   // of a smoothing filter: a second at 60 Hz
+inline constexpr std::size_t kMaxRegions = 16;        // solved on their own; the sources use 3 and 14
+inline constexpr std::size_t kMaxRegionShapes = 32;  // key shapes or examples of one; the sources use 8 to 15
+inline constexpr std::size_t kMaxWindowFrames = 61;  // of a smoothing filter: a second at 60 Hz
 inline constexpr std::size_t kMaxControlPairs = 128;  // of each kind an artist may tie: every shape once
 inline constexpr std::size_t kMaxImageWidth = 1920;   // px
 inline constexpr std::size_t kMaxImageHeight = 1200;  // px
@@ -45,6 +47,10 @@ static_assert(kMaxPoints >= 2 * kMaxMarkers);
 // the largest pack that can be written fits: basis, RBF basis, centres, weights as float32
 static_assert(4 * (kMaxRows * kMaxShapes + kMaxRbfDimensions * kMaxRows + kMaxRbfCentres * kMaxRbfDimensions +
                    kMaxRbfCentres * kMaxShapes) <=
+              kMaxPackBytes / 2);
+// ... and the largest regional one: examples, their origins, their shapes, blends
+static_assert(4 * kMaxRegions *
+                  (kMaxRows * (kMaxRegionShapes + 3) + kMaxRegionShapes * kMaxShapes + kMaxShapes) <=
               kMaxPackBytes / 2);
 static_assert(kMaxModes <= kMaxShapes);
 static_assert(kMaxShapes <= kMaxUnknowns);

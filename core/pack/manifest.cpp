@@ -88,10 +88,13 @@ Result<void, PackError> read_identity(const fb::Manifest& stored, PackManifest& 
 }
 
 Result<void, PackError> read_counts(const fb::Manifest& stored, PackManifest& out) {
-    if (stored.solver() > static_cast<std::uint8_t>(SolverKind::kRbf)) return failure(PackError::kSolverKind);
+    if (stored.solver() > static_cast<std::uint8_t>(kLastSolverKind)) return failure(PackError::kSolverKind);
     out.solver = static_cast<SolverKind>(stored.solver());
-    out.counts = {stored.marker_count(), stored.shape_count(), stored.rbf_dimension_count(),
-                  stored.rbf_centre_count()};
+    out.counts.markers = stored.marker_count();
+    out.counts.shapes = stored.shape_count();
+    out.counts.rbf_dimensions = stored.rbf_dimension_count();
+    out.counts.rbf_centres = stored.rbf_centre_count();
+    out.counts.regions = stored.region_count();
     const PackCounts& n = out.counts;
     if (n.markers < kMinMarkers || n.markers > kMaxMarkers) return failure(PackError::kMarkerCount);
     if (n.shapes < 1 || n.shapes > kMaxShapes) return failure(PackError::kShapeCount);
@@ -102,6 +105,10 @@ Result<void, PackError> read_counts(const fb::Manifest& stored, PackManifest& ou
     if (n.rbf_dimensions < least || n.rbf_dimensions > dimension_limit || n.rbf_dimensions > 3 * n.markers ||
         n.rbf_centres < least || n.rbf_centres > centre_limit) {
         return failure(PackError::kRbfCounts);
+    }
+    const bool regional = is_regional(out.solver);
+    if (n.regions < (regional ? 1 : 0) || n.regions > (regional ? kMaxRegions : 0)) {
+        return failure(PackError::kRegionCount);
     }
     out.rate_hz = stored.rate_hz();
     out.noise_mm = stored.noise_mm();
@@ -232,6 +239,22 @@ std::string_view section_name(SectionType type) {
             return "rbf weights";
         case SectionType::kRbfOffset:
             return "rbf offset";
+        case SectionType::kRegionNames:
+            return "region names";
+        case SectionType::kRegionTable:
+            return "region table";
+        case SectionType::kRegionMarkers:
+            return "region markers";
+        case SectionType::kRegionMarkerBlend:
+            return "marker blend";
+        case SectionType::kRegionOrigin:
+            return "region origin";
+        case SectionType::kRegionExamples:
+            return "region examples";
+        case SectionType::kRegionShapes:
+            return "region shapes";
+        case SectionType::kRegionShapeBlend:
+            return "shape blend";
     }
     return "unknown";
 }

@@ -1,6 +1,7 @@
 #include "core/pack/open_pack.hpp"
 
 #include "core/base/math.hpp"
+#include "core/pack/region_sections.hpp"
 
 namespace rig {
 
@@ -9,6 +10,8 @@ namespace {
 // Sizes beyond which a number is a mistake or an attack: they keep every later product finite.
 constexpr double kMaxFaceMm = 1e4;
 constexpr double kMaxWeight = 1e3;
+constexpr double kMinBlend = 1e-6;
+constexpr double kMaxBlend = 1.0001;  // 1 within the tolerance of its sum
 constexpr double kMinSigma = 1e-6;
 constexpr double kMaxEnergyMm2 = 1e9;
 constexpr double kMaxRbf = 1e6;
@@ -28,6 +31,8 @@ Bounds bounds_of(SectionType type) {
         case SectionType::kNeutral:
         case SectionType::kBasis:
         case SectionType::kRbfMean:
+        case SectionType::kRegionOrigin:
+        case SectionType::kRegionExamples:
             return {-kMaxFaceMm, kMaxFaceMm, PackError::kMagnitude};
         case SectionType::kPriorSigma:
             return {kMinSigma, kMaxWeight, PackError::kPriorSigma};
@@ -40,6 +45,10 @@ Bounds bounds_of(SectionType type) {
             return {-kMaxRbf, kMaxRbf, PackError::kMagnitude};
         case SectionType::kRbfWidths:
             return {kMinWidthMm, kMaxRbf, PackError::kRbfWidths};
+        case SectionType::kRegionMarkerBlend:
+            return {kMinBlend, kMaxBlend, PackError::kRegionMarkerBlend};
+        case SectionType::kRegionShapeBlend:
+            return {0.0, kMaxBlend, PackError::kRegionShapeBlend};
         default:
             return {-kMaxWeight, kMaxWeight, PackError::kMagnitude};
     }
@@ -101,9 +110,11 @@ Result<void, PackError> check_section_set(const PackManifest& manifest) {
     std::array<bool, kSectionTypeCount + 1> present{};
     for (const PackSection& section : manifest.sections)
         present[static_cast<std::size_t>(section.type)] = true;
-    const bool rbf = manifest.solver == SolverKind::kRbf;
     for (std::size_t i = 1; i <= kSectionTypeCount; ++i) {
-        const bool wanted = rbf || !is_rbf_section(static_cast<SectionType>(i));
+        const auto type = static_cast<SectionType>(i);
+        const bool wanted = is_rbf_section(type)      ? manifest.solver == SolverKind::kRbf
+                            : is_region_section(type) ? is_regional(manifest.solver)
+                                                      : true;
         if (wanted && !present[i]) return failure(PackError::kSectionMissing);
         if (!wanted && present[i]) return failure(PackError::kSectionUnexpected);
     }
@@ -119,7 +130,7 @@ Result<void, PackError> check_hashes(ByteSpan bytes, const PackManifest& manifes
     return {};
 }
 
-std::span<const float>* tensor_of(SolvePack& pack, SectionType type) {
+std::span<const float>* tensor_of(SolvePack& pack, RegionSections& regions, SectionType type) {
     switch (type) {
         case SectionType::kNeutral:
             return &pack.neutral_mm;
@@ -147,24 +158,46 @@ std::span<const float>* tensor_of(SolvePack& pack, SectionType type) {
             return &pack.rbf.weights;
         case SectionType::kRbfOffset:
             return &pack.rbf.offset;
+        case SectionType::kRegionMarkerBlend:
+            return &regions.marker_blend;
+        case SectionType::kRegionOrigin:
+            return &regions.origin_mm;
+        case SectionType::kRegionExamples:
+            return &regions.examples_mm;
+        case SectionType::kRegionShapes:
+            return &regions.shapes;
+        case SectionType::kRegionShapeBlend:
+            return &regions.shape_blend;
         case SectionType::kShapeNames:
         case SectionType::kMarkerNames:
+        case SectionType::kRegionNames:
+        case SectionType::kRegionTable:
+        case SectionType::kRegionMarkers:
             break;
     }
     return nullptr;
 }
 
-Result<void, PackError> read_section(ByteSpan part, SectionType type, const PackManifest& manifest,
-                                     SolvePack& pack) {
+Result<void, PackError> read_section(ByteSpan part, SectionType type, const PackCounts& counts,
+                                     SolvePack& pack, RegionSections& regions) {
     if (type == SectionType::kShapeNames)
         return read_names(part, std::span(pack.shape_names).first(pack.shape_count));
     if (type == SectionType::kMarkerNames) {
         return read_names(part, std::span(pack.marker_names).first(pack.marker_count));
     }
-    if (part.size() != sizeof(float) * section_floats(type, manifest.counts))
+    if (type == SectionType::kRegionNames)
+        return read_names(part, std::span(regions.names).first(counts.regions));
+    if (type == SectionType::kRegionTable) return {};  // read first
+    if (type == SectionType::kRegionMarkers) {
+        const auto markers = read_region_markers(part, counts);
+        if (!markers) return failure(markers.error());
+        regions.markers = *markers;
+        return {};
+    }
+    if (part.size() != sizeof(float) * section_floats(type, counts))
         return failure(PackError::kSectionLength);
     const std::span<const float> values = as_floats(part);
-    *tensor_of(pack, type) = values;
+    *tensor_of(pack, regions, type) = values;
     return check_numbers(type, values);
 }
 
@@ -253,12 +286,20 @@ Result<SolvePack, PackError> open_pack(ByteSpan bytes, HashFunction hash) {
     }
     SolvePack pack;
     copy_scalars(*manifest, pack);
+    PackCounts counts = manifest->counts;
     for (const PackSection& section : manifest->sections) {
-        auto ok = read_section(section_bytes(bytes, section), section.type, *manifest, pack);
+        if (section.type != SectionType::kRegionTable) continue;
+        auto ok = read_region_table(section_bytes(bytes, section), pack.solver, counts, pack);
+        if (!ok) return failure(ok.error());
+    }
+    RegionSections regions;
+    for (const PackSection& section : manifest->sections) {
+        auto ok = read_section(section_bytes(bytes, section), section.type, counts, pack, regions);
         if (!ok) return failure(ok.error());
     }
     if (auto ok = check_weight_ranges(pack); !ok) return failure(ok.error());
     if (auto ok = check_rbf_basis(pack.rbf, 3 * manifest->counts.markers); !ok) return failure(ok.error());
+    if (auto ok = assemble_regions(regions, pack); !ok) return failure(ok.error());
     return pack;
 }
 

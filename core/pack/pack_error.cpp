@@ -60,6 +60,8 @@ std::string_view pack_error_text(PackError error) {
             return "its number of shapes is outside 1 to 256";
         case PackError::kRbfCounts:
             return "its numbers of RBF centres or dimensions are outside the limits";
+        case PackError::kRegionCount:
+            return "its number of regions is outside the limits or does not fit its solver";
         case PackError::kCameraCount:
             return "it has more cameras than a rig carries";
         case PackError::kMemory:
@@ -94,6 +96,18 @@ std::string_view pack_error_text(PackError error) {
             return "its RBF kernel is unknown, or it has one without being an RBF";
         case PackError::kRbfHull:
             return "its RBF fallback distances are not 0 <= near < far, or it is no RBF";
+        case PackError::kRegionTable:
+            return "a region has an unknown solver or more markers or examples than there can be";
+        case PackError::kRegionMarkers:
+            return "the markers of a region are not rising indices of the pack's markers";
+        case PackError::kRegionMarkerBlend:
+            return "the blend weights of a marker are not positive or do not sum to 1 over its regions";
+        case PackError::kRegionOrigin:
+            return "the origin of a region is not the one its solver needs";
+        case PackError::kRegionExamples:
+            return "the padding of a region's examples is not zero or they are not about their origin";
+        case PackError::kRegionShapeBlend:
+            return "the blend weights of a shape are outside 0 to 1 or do not sum to 1 or 0 over the regions";
         case PackError::kCameraIntrinsics:
             return "a camera's size, focal length, centre or distortion is implausible";
         case PackError::kCameraRotation:

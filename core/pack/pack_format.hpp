@@ -10,7 +10,10 @@
 //   64     manifest (FlatBuffers, manifest.fbs), then zeros to a multiple of 64
 //          sections in the order of the manifest's table, each at the next multiple of 64 after the one
 //          before, zeros between; the last one ends the file
-// All integers and floats little-endian. Tensors are float32, row-major. Names are UTF-8, each ended by '\n'.
+// All integers and floats little-endian. Tensors are float32, row-major; lists of markers are u16. Names are
+// UTF-8, each ended by '\n'. The region table is one record of 8 bytes a region: u8 solver, u8 0, u16
+// markers, u16 examples, u16 0; the other region sections hold the regions' parts one after the other in its
+// order.
 #pragma once
 
 #include <array>
@@ -54,25 +57,42 @@ enum class SectionType : std::uint16_t {
     kRbfWidths = 13,
     kRbfWeights = 14,
     kRbfOffset = 15,
+    kRegionNames = 16,
+    kRegionTable = 17,
+    kRegionMarkers = 18,
+    kRegionMarkerBlend = 19,
+    kRegionOrigin = 20,
+    kRegionExamples = 21,
+    kRegionShapes = 22,
+    kRegionShapeBlend = 23,
 };
-inline constexpr std::size_t kSectionTypeCount = 15;  // types are 1..kSectionTypeCount
+inline constexpr std::size_t kSectionTypeCount = 23;  // types are 1..kSectionTypeCount
 
 // "basis", "rbf centres", ...; "unknown" outside the enumeration.
 [[nodiscard]] std::string_view section_name(SectionType type);
 [[nodiscard]] constexpr bool is_rbf_section(SectionType type) {
-    return type >= SectionType::kRbfMean;
+    return type >= SectionType::kRbfMean && type <= SectionType::kRbfOffset;
 }
+[[nodiscard]] constexpr bool is_region_section(SectionType type) {
+    return type >= SectionType::kRegionNames;
+}
+inline constexpr std::size_t kRegionRecordBytes = 8;
 
 [[nodiscard]] constexpr std::uint64_t align_up(std::uint64_t offset) {
     return (offset + (kPackAlignment - 1)) / kPackAlignment * kPackAlignment;
 }
 
-// Numbers a tensor section of this type has under these counts; 0 for the text sections.
+// Numbers a tensor section of this type has under these counts; 0 for sections of text or of integers.
 struct PackCounts {
     std::size_t markers = 0;
     std::size_t shapes = 0;
     std::size_t rbf_dimensions = 0;
     std::size_t rbf_centres = 0;
+    std::size_t regions = 0;
+    // Sums over the region table; read with it.
+    std::size_t region_markers = 0;         // m_r
+    std::size_t region_examples = 0;        // n_r
+    std::size_t region_example_floats = 0;  // 3 m_r padded(n_r)
 };
 [[nodiscard]] constexpr std::size_t section_floats(SectionType type, const PackCounts& n) {
     switch (type) {
@@ -96,8 +116,21 @@ struct PackCounts {
             return n.rbf_centres;
         case SectionType::kRbfWeights:
             return n.rbf_centres * n.shapes;
+        case SectionType::kRegionMarkerBlend:
+            return n.region_markers;
+        case SectionType::kRegionOrigin:
+            return 3 * n.region_markers;
+        case SectionType::kRegionExamples:
+            return n.region_example_floats;
+        case SectionType::kRegionShapes:
+            return n.region_examples * n.shapes;
+        case SectionType::kRegionShapeBlend:
+            return n.regions * n.shapes;
         case SectionType::kShapeNames:
         case SectionType::kMarkerNames:
+        case SectionType::kRegionNames:
+        case SectionType::kRegionTable:
+        case SectionType::kRegionMarkers:
             break;
     }
     return 0;

@@ -12,7 +12,19 @@
 
 namespace rig {
 
-enum class SolverKind : std::uint8_t { kLeastSquares = 0, kNonNegative = 1, kBoxQp = 2, kRbf = 3 };
+enum class SolverKind : std::uint8_t {
+    kLeastSquares = 0,
+    kNonNegative = 1,
+    kBoxQp = 2,
+    kRbf = 3,
+    kKeyShapes = 4,  // per region: non-negative combinations of key shapes  [Chuang02 eq. 4]
+    kExamples = 5,   // per region: convex combinations of examples          [Zhang06 eq. 1-5]
+};
+inline constexpr SolverKind kLastSolverKind = SolverKind::kExamples;
+
+[[nodiscard]] constexpr bool is_regional(SolverKind solver) {
+    return solver == SolverKind::kKeyShapes || solver == SolverKind::kExamples;
+}
 
 // phi of u = |x - c_k|^2 / width_k^2, the squared distance in widths:
 //   Gaussian       exp(-u / 2)          the source's [Deng06 eq. 4]
@@ -44,6 +56,26 @@ struct RbfModel {
     std::span<const float> offset;      // [N]
 };
 
+enum class RegionSolver : std::uint8_t { kNonNegative = 0, kSimplex = 1 };
+
+// A part of the face that is solved on its own: its markers as a combination of its examples,
+//   p - origin = examples c,   shapes it asks for: sum_j c_j shapes_j.
+// kNonNegative: c >= 0, origin the centroid of the region's neutral markers, the same for every marker.
+// kSimplex: c >= 0 and sum c = 1, origin the mean example.
+// Where regions meet, each streamed shape is blended linearly: w_i = sum over regions of shape_blend_i w_i.
+struct RegionModel {
+    std::string_view name;
+    RegionSolver solver = RegionSolver::kNonNegative;
+    std::uint16_t marker_count = 0;          // m_r, 1..m
+    std::uint16_t example_count = 0;         // n_r, 1..kMaxRegionShapes
+    std::span<const std::uint16_t> markers;  // [m_r] rising
+    std::span<const float> marker_blend;     // [m_r] > 0; sums to 1 over the regions that share the marker
+    std::span<const float> origin_mm;        // [3 m_r]
+    std::span<const float> examples_mm;      // [3 m_r x padded(n_r)] row-major, zeros in the padding
+    std::span<const float> shapes;           // [n_r x N] row-major: streamed weights of each example
+    std::span<const float> shape_blend;  // [N] 0..1; sums to 1 over the regions, or to 0 for a shape of none
+};
+
 // Column i of the basis is (shape i - neutral) at the markers; rows x0, y0, z0, x1, ... of marker k at 3k.
 // Frames: face frame of the rig, mm: +x performer's left, +y up, +z out of the face, origin between the
 // eyeballs.
@@ -60,11 +92,13 @@ struct SolvePack {
     std::span<const float> prior_mean;   // [N] expected weights
     std::span<const float> prior_sigma;  // [N] > 0, expected spread of each weight: S = diag(sigma^2)
     std::span<const float>
-        temporal_gamma;         // [N] >= 0, mm^2: pull towards the previous solution, in units of E
-    float noise_mm = 0.1F;      // s: standard deviation of one marker coordinate
-    float sparsity_mm2 = 0.0F;  // beta: E += beta |w|_1             [Hybrid16 eq. 3]
-    float ridge_mm2 = 0.0F;     // eps:  E += eps |w|^2              [Hybrid16 eq. 3]
-    RbfModel rbf;               // empty unless solver == kRbf
+        temporal_gamma;             // [N] >= 0, mm^2: pull towards the previous solution, in units of E
+    float noise_mm = 0.1F;          // s: standard deviation of one marker coordinate
+    float sparsity_mm2 = 0.0F;      // beta: E += beta |w|_1             [Hybrid16 eq. 3]
+    float ridge_mm2 = 0.0F;         // eps:  E += eps |w|^2              [Hybrid16 eq. 3]
+    RbfModel rbf;                   // empty unless solver == kRbf
+    std::uint8_t region_count = 0;  // 0 unless is_regional(solver)
+    std::array<RegionModel, kMaxRegions> regions{};
 
     std::uint8_t camera_count = 0;  // 0 for packs that only solve marker streams
     std::array<CameraModel, kMaxCameras> cameras{};

@@ -52,6 +52,8 @@ class Pipeline {
     [[nodiscard]] const NamedMarkers& named_markers() const { return named_; }
     // Which observation of each camera each marker was taken for, -1 none.
     [[nodiscard]] const Matches& matches() const { return track_report_.matches; }
+    // Of a regional pack, after a solved step: coefficients, residual and confidence of each region.
+    [[nodiscard]] const RegionalOutput& regions() const { return solved_.regional; }
     [[nodiscard]] const DetectorReport& detector_report(std::size_t camera) const {
         return detector_reports_[camera];
     }

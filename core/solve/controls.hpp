@@ -30,10 +30,10 @@
 // an offset shows on it.
 //
 // Solvers. Box QP, NNLS and least squares are that quadratic, and all controls act as above; a range that is
-// narrower than the pack's bounds a shape even in least squares. RBF has none: its answer y is taken as a
-// measurement, E = sum_i |b_i|^2 (w_i - y_i)^2, solved in the pack's ranges with the same terms. With neutral
-// controls nothing of this runs and no bit changes. Confidence says what markers know and hears nothing of
-// controls.
+// narrower than the pack's bounds a shape even in least squares. RBF and the solvers by regions have none:
+// their answer y is taken as a measurement, E = sum_i |b_i|^2 (w_i - y_i)^2, solved in the pack's ranges with
+// the same terms. With neutral controls nothing of this runs and no bit changes. Confidence says what markers
+// know and hears nothing of controls.
 #pragma once
 
 #include <array>

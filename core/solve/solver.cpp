@@ -159,6 +159,23 @@ void blend_rbf(std::span<const float> references, double share, SolverOutput& ou
     }
 }
 
+void run_regional(const SolverConfig& config, SolverState& state, SolverWorkspace& w, SolverOutput& output,
+                  SolverReport& report) {
+    const SolvePack& pack = config.pack;
+    const RegionalInput input{
+        {w.positions_mm.data(), pack.marker_count}, {w.weights.data(), pack.marker_count}, output.confidence};
+    solve_regions(pack, config.regional, input, state.regional, w.regional, output.regional, output.weights);
+    report.optimal = true;
+    for (std::size_t r = 0; r < pack.region_count; ++r) {
+        const RegionReport& region = output.regional.regions[r];
+        report.optimal = report.optimal && region.optimal;
+        report.kkt = std::max(report.kkt, region.kkt);
+        report.iterations = static_cast<std::uint16_t>(report.iterations + region.iterations);
+        report.changes = static_cast<std::uint16_t>(report.changes + region.changes);
+        report.objective_mm2 += region.objective_mm2;
+    }
+}
+
 // Below this share of the mean diagonal of B^T B, ridge and pull leave float's inverse to wear out.
 constexpr double kFirmShare = 1e-4;
 
@@ -207,16 +224,18 @@ void solve_in(const SolverConfig& config, const NormalTables<Real>& tables, cons
         return;
     }
     const bool is_rbf = pack.solver == SolverKind::kRbf;
-    const bool controlled = config.controls.acts_on_problem;  // then Real is double
+    const bool measures = is_rbf || is_regional(pack.solver);  // no quadratic in w
+    const bool controlled = config.controls.acts_on_problem;   // then Real is double
     if (is_rbf) run_rbf(config, completed, w, report);
-    if (is_rbf ? report.hull_share > 0.0 : !controlled) {
+    if (is_regional(pack.solver)) run_regional(config, state, w, output, report);
+    if (measures ? report.hull_share > 0.0 : !controlled) {
         run_quadratic(config, pack_problem(config, quadratic.normal, own), state, quadratic.qp, own, output,
                       report);
     }
     if (is_rbf) blend_rbf({w.rbf_weights.data(), n}, report.hull_share, output);
     if constexpr (sizeof(Real) == sizeof(double)) {
         if (controlled) {
-            run_controlled(config, is_rbf ? nullptr : &quadratic.normal, input.gamma_scale, state, own,
+            run_controlled(config, measures ? nullptr : &quadratic.normal, input.gamma_scale, state, own,
                            output, report);
         }
     }
@@ -239,6 +258,7 @@ void configure_solver(const SolvePack& pack, double rate_hz, SolverWorkspace& wo
     config.pack = pack;
     config.rate_hz = rate_hz;
     measure_firmness(pack, config);
+    build_regional_tables(pack, config.regional);
     build_normal_tables(pack, config.tables);
     build_normal_tables(pack, config.precise_tables);
     if (pack.solver == SolverKind::kRbf) build_rbf_tables(pack, config.rbf);
@@ -252,6 +272,7 @@ void reset_solver(SolverState& state) {
     state.precise.normal.valid = false;
     state.precise.qp.warm = false;
     state.controlled.qp.warm = false;
+    reset_regions(state.regional);
     state.has_previous = false;
     state.posterior.valid = false;
     state.confidence = {};

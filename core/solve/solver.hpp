@@ -14,6 +14,7 @@
 #include "core/solve/controls.hpp"
 #include "core/solve/normal_equations.hpp"
 #include "core/solve/rbf.hpp"
+#include "core/solve/regional.hpp"
 #include "core/stabilise/stabilised_markers.hpp"
 
 namespace rig {
@@ -51,6 +52,7 @@ struct SolverConfig {
     SolvePack pack;              // spans; the bytes outlive the solver
     NormalTables<float> tables;  // built once
     NormalTables<double> precise_tables;
+    RegionalTables regional;   // of a regional pack
     double ridge_share = 0.0;  // ridge and least pull, relative to the mean diagonal of B^T B
     double pull_share = 0.0;
     RbfTables rbf;  // of an RBF pack; its hull_share asks for the quadratic
@@ -65,6 +67,7 @@ struct SolverConfig {
 struct SolverState {
     QuadraticState<float> quadratic;
     QuadraticState<double> precise;
+    RegionalState regional;
     ControlledState controlled;
     bool has_previous = false;
     std::int64_t previous_us = 0;
@@ -78,6 +81,7 @@ struct SolverWorkspace {
     QuadraticWorkspace<double> precise;
     RbfWorkspace rbf;
     std::array<float, kMaxShapes> rbf_weights{};
+    RegionalWorkspace regional;
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> weights{};
     ConfidenceWorkspace confidence;
@@ -88,13 +92,14 @@ struct SolverWorkspace {
 struct SolverOutput {
     std::array<double, kMaxShapes> weights{};    // inside [low, high] of the pack
     std::array<float, kMaxShapes> confidence{};  // 0..1, see confidence.hpp
+    RegionalOutput regional;                     // of a regional pack: coefficients and certificates
 };
 
 struct SolverReport {
     bool solved = false;  // false: nothing was seen; weights are the previous ones, or the rest pose
     bool optimal = false;
-    double kkt = 0.0;  // of the pack's problem at the answer, before any clamping of least squares
-    double objective_mm2 = 0.0;
+    double kkt = 0.0;            // of the pack's problem at the answer, before any clamping of least squares
+    double objective_mm2 = 0.0;  // regional packs: the sum over regions, as iterations; kkt is their worst
     std::uint16_t iterations = 0;
     std::uint16_t changes = 0;  // of the working set
     std::uint16_t markers_used = 0;

@@ -47,6 +47,10 @@ const char* solver_name(SolverKind solver) {
             return "boxqp";
         case SolverKind::kRbf:
             return "rbf";
+        case SolverKind::kKeyShapes:
+            return "keyshapes";
+        case SolverKind::kExamples:
+            return "examples";
     }
     return "unknown";
 }
@@ -92,6 +96,27 @@ json shape_json(const SolvePack& pack, std::size_t i) {
             {"temporal_gamma_mm2", pack.temporal_gamma[i]}};
 }
 
+const char* region_solver_name(RegionSolver solver) {
+    return solver == RegionSolver::kSimplex ? "simplex" : "nnls";
+}
+
+json region_json(const SolvePack& pack, const RegionModel& region) {
+    json out = {{"name", region.name},
+                {"solver", region_solver_name(region.solver)},
+                {"examples", region.example_count},
+                {"markers", json::array()},
+                {"shapes", json::array()}};
+    for (std::size_t a = 0; a < region.marker_count; ++a) {
+        out["markers"].push_back(
+            {{"name", pack.marker_names[region.markers[a]]}, {"blend", region.marker_blend[a]}});
+    }
+    for (std::size_t i = 0; i < pack.shape_count; ++i) {
+        if (region.shape_blend[i] > 0.0F)
+            out["shapes"].push_back({{"name", pack.shape_names[i]}, {"blend", region.shape_blend[i]}});
+    }
+    return out;
+}
+
 json pack_json(const OpenedPack& opened) {
     const SolvePack& pack = opened.pack();
     const PackManifest& manifest = opened.manifest();
@@ -114,7 +139,8 @@ json pack_json(const OpenedPack& opened) {
                 {"rbf_centres", pack.rbf.centre_count},
                 {"rbf_kernel", rbf_kernel_name(pack.rbf.kernel)},
                 {"rbf_hull_widths", {pack.rbf.hull_near_widths, pack.rbf.hull_far_widths}}};
-    for (const char* list : {"boards", "sections", "cameras", "shapes", "markers"}) out[list] = json::array();
+    for (const char* list : {"boards", "sections", "cameras", "regions", "shapes", "markers"})
+        out[list] = json::array();
     for (const std::string_view board : manifest.boards) out["boards"].push_back(board);
     for (const PackSection& section : manifest.sections) {
         out["sections"].push_back({{"type", section_name(section.type)},
@@ -124,6 +150,8 @@ json pack_json(const OpenedPack& opened) {
     }
     for (std::size_t c = 0; c < pack.camera_count; ++c)
         out["cameras"].push_back(camera_json(pack.cameras[c]));
+    for (std::size_t r = 0; r < pack.region_count; ++r)
+        out["regions"].push_back(region_json(pack, pack.regions[r]));
     for (std::size_t i = 0; i < pack.shape_count; ++i) out["shapes"].push_back(shape_json(pack, i));
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         out["markers"].push_back(
@@ -159,6 +187,7 @@ void print_identity(const PackInfoCommand& command, const OpenedPack& opened) {
                        pack.rbf.hull_near_widths, pack.rbf.hull_far_widths);
         }
     }
+    if (pack.region_count > 0) fmt::print("regions      {}\n", pack.region_count);
     fmt::print("cameras      {}\n", pack.camera_count);
 }
 
@@ -173,6 +202,13 @@ void print_tables(const OpenedPack& opened) {
             c, camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px,
             camera.k1, camera.k2, camera.k3, camera.p1, camera.p2, camera.centre_mm[0], camera.centre_mm[1],
             camera.centre_mm[2]);
+    }
+    for (std::size_t r = 0; r < pack.region_count; ++r) {
+        const RegionModel& region = pack.regions[r];
+        std::size_t shapes = 0;
+        for (const float blend : region.shape_blend) shapes += blend > 0.0F ? 1 : 0;
+        fmt::print("  {:<14} {:<8} {:>3} markers {:>3} examples  speaks for {} shapes\n", region.name,
+                   region_solver_name(region.solver), region.marker_count, region.example_count, shapes);
     }
     fmt::print("\n{:<16} {:>9} {:>9}  sha256\n", "section", "offset", "bytes");
     for (const PackSection& section : manifest.sections) {

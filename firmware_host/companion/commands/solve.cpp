@@ -63,7 +63,7 @@ std::vector<ReportedRegion> reported_regions(const SolvePack& pack) {
     return regions;
 }
 
-std::vector<std::string> report_columns(std::span<const ReportedRegion> regions) {
+std::vector<std::string> report_columns(const SolvePack& pack, std::span<const ReportedRegion> regions) {
     std::vector<std::string> columns{"frame",        "state",        "kkt",
                                      "objective",    "iterations",   "working_set_changes",
                                      "optimal",      "markers_used", "residual_rms_mm",
@@ -71,6 +71,10 @@ std::vector<std::string> report_columns(std::span<const ReportedRegion> regions)
                                      "slip_tx_mm",   "slip_ty_mm",   "slip_tz_mm",
                                      "delay_frames", "delay_ms"};
     for (const ReportedRegion& region : regions) columns.push_back("confidence_" + region.name);
+    for (std::size_t r = 0; r < pack.region_count; ++r) {
+        columns.push_back(fmt::format("region_{}_residual_mm", pack.regions[r].name));
+        columns.push_back(fmt::format("region_{}_confidence", pack.regions[r].name));
+    }
     return columns;
 }
 
@@ -116,7 +120,8 @@ Result<void, FileError> check_stream(const SolveOptions& options, const SolvePac
 }
 
 void add_report_row(std::size_t frame, const SolvePack& pack, std::span<const ReportedRegion> regions,
-                    const FaceState& state, const FrameReport& report, CsvWriter& csv) {
+                    const FaceState& state, const FrameReport& report, const RegionalOutput& solved,
+                    CsvWriter& csv) {
     csv.integer(static_cast<std::int64_t>(frame)).text(state_name(state.state));
     csv.number(report.kkt, 12).number(report.objective_mm2, 6).integer(report.iterations);
     csv.integer(report.working_set_changes).integer(report.optimal ? 1 : 0);
@@ -128,18 +133,23 @@ void add_report_row(std::size_t frame, const SolvePack& pack, std::span<const Re
         csv.number(static_cast<double>(region_confidence(pack.prior_sigma, state.confidence, region.shapes)),
                    5);
     }
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    for (std::size_t r = 0; r < pack.region_count; ++r) {
+        csv.number(report.solved ? solved.regions[r].residual_rms_mm : kNone, 6);
+        csv.number(report.solved ? static_cast<double>(solved.regions[r].confidence) : kNone, 4);
+    }
     csv.end_row();
 }
 
 void add_results(const SolveOptions& options, const SolvePack& pack, std::size_t frame,
-                 const FaceState& state, const FrameReport& report, std::size_t slots,
-                 SolveResults& results) {
+                 const FaceState& state, const FrameReport& report, const RegionalOutput& regions,
+                 std::size_t slots, SolveResults& results) {
     results.weights.integer(static_cast<std::int64_t>(frame));
     results.weights.number(static_cast<double>(frame) / options.rate_hz, 6);
     for (std::size_t i = 0; i < pack.shape_count; ++i)
         results.weights.number(static_cast<double>(state.weights[i]), 6);
     results.weights.end_row();
-    add_report_row(frame, pack, results.regions, state, report, results.report);
+    add_report_row(frame, pack, results.regions, state, report, regions, results.report);
     for (std::size_t s = 0; s < slots; ++s) results.labels.values.push_back(report.labels[s]);
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -190,7 +200,7 @@ int solve_frames(const SolveOptions& options, const SolvePack& pack, const NpyAr
             pipeline.step(LabelledFrame{capture_us, positions}, *state, *report);
             label_own_rows(pipeline, positions, *report);
         }
-        add_results(options, pack, frame, *state, *report, slots, results);
+        add_results(options, pack, frame, *state, *report, pipeline.regions(), slots, results);
         progress.update(frame + 1);
     }
     return kExitOk;
@@ -283,7 +293,8 @@ int run_solve(const SolveOptions& command_line) {
         return kExitUsage;
     }
     std::vector<ReportedRegion> regions = reported_regions(pack);
-    SolveResults results{{}, CsvWriter(weight_columns(pack)), CsvWriter(report_columns(regions)), {}, {}};
+    SolveResults results{
+        {}, CsvWriter(weight_columns(pack)), CsvWriter(report_columns(pack, regions)), {}, {}};
     results.regions = std::move(regions);
     results.labels.shape = {stream->shape[0], stream->shape[1]};
     results.points.shape = {stream->shape[0], pack.marker_count, 3};

@@ -40,6 +40,7 @@ struct TrainCommand {
     bool noise_given = false;
     std::string report;
     std::string name;
+    std::string method = "spread";
     std::vector<std::string> takes;
     std::vector<double> hull_fallback;  // near, far
     TrainOptions options;
@@ -68,6 +69,10 @@ void print_result(const TrainCommand& command, const TrainedPack& pack) {
                pack.report.condition);
     fmt::print("noise {:.4g} mm, sparsity {:.4g} mm^2, ridge {:.4g} mm^2\n", pack.noise_mm, pack.sparsity_mm2,
                pack.ridge_mm2);
+    for (const TrainedRegion& region : pack.regions) {
+        fmt::print("region {}: {} markers, {} examples\n", region.name, region.markers.size(),
+                   region.example_count);
+    }
     if (!pack.report.rbf) return;
     const RbfTrainingReport& rbf = *pack.report.rbf;
     fmt::print(
@@ -200,7 +205,8 @@ Result<void, FileError> estimate_noise(TrainCommand& command, const MarkerLayout
 
 // After training: what the model cannot explain of the same markers.
 void print_residual(const TrainedPack& pack, const MarkerTake& take) {
-    if (pack.solver == SolverKind::kRbf) return;  // a regression has no degrees of freedom to take off
+    // A regression and regions have no degrees of freedom of the weights to take off.
+    if (pack.solver == SolverKind::kRbf || is_regional(pack.solver)) return;
     const MarkerTake thin = thinned(take, kMostFitFrames);
     const auto residual = noise_of_residual(pack.view(), thin, solve_take(pack.view(), thin, true));
     if (!residual) return;
@@ -223,6 +229,11 @@ std::string fault_of_command(TrainCommand& command) {
         return fmt::format("--hold {}: give the frames of --markers in which the face holds still, e.g. 0:60",
                            command.hold);
     }
+    const auto method = key_shape_method(command.method);
+    if (!method) {
+        return fmt::format("--method {}: give spread, clusters2, clusters3 or hull", command.method);
+    }
+    command.options.regional.method = *method;
     if (!command.hull_fallback.empty()) {
         command.options.rbf.hull_near_widths = command.hull_fallback.front();
         command.options.rbf.hull_far_widths = command.hull_fallback.back();
@@ -320,12 +331,15 @@ void add_train_verb(CLI::App& app, int& exit_code) {
     const std::map<std::string, SolverKind> solvers = {{"boxqp", SolverKind::kBoxQp},
                                                        {"nnls", SolverKind::kNonNegative},
                                                        {"rbf", SolverKind::kRbf},
-                                                       {"lsq", SolverKind::kLeastSquares}};
-    verb->add_option("--solver", command->options.solver, "boxqp, nnls, rbf or lsq")
+                                                       {"lsq", SolverKind::kLeastSquares},
+                                                       {"keyshapes", SolverKind::kKeyShapes},
+                                                       {"examples", SolverKind::kExamples}};
+    verb->add_option("--solver", command->options.solver, "boxqp, nnls, rbf, lsq, keyshapes or examples")
         ->transform(CLI::CheckedTransformer(solvers, CLI::ignore_case).description(""))
         ->type_name("NAME")
         ->default_str("boxqp");
-    verb->add_option("--take", command->takes, "performances to learn from (CSV); rbf needs one")
+    verb->add_option("--take", command->takes,
+                     "performances to learn from (CSV); rbf, keyshapes and examples need one")
         ->type_name("CSV...");
     verb->add_option("--cameras", command->cameras,
                      "cameras.json of the helmet; without it the pack solves marker streams only")
@@ -347,6 +361,17 @@ void add_train_verb(CLI::App& app, int& exit_code) {
                      fmt::format("weight of sum w^2, in the same units [boxqp: {}]", kDefaultRidge))
         ->type_name("X");
     add_rbf_options(*verb, *command);
+    verb->add_option("--method", command->method,
+                     "choice of key shapes: spread, clusters2, clusters3 or hull")
+        ->capture_default_str()
+        ->type_name("NAME");
+    verb->add_option("--key-shapes", command->options.regional.key_shapes, "key shapes of a region")
+        ->capture_default_str()
+        ->type_name("K");
+    verb->add_option("--examples", command->options.regional.examples,
+                     "examples of the face, the neutral one among them")
+        ->capture_default_str()
+        ->type_name("K");
     verb->add_option("--report", command->report, "HTML page about the pack and its training")
         ->type_name("HTML");
     verb->add_option("--name", command->name, "name inside the pack [the file's]")->type_name("NAME");

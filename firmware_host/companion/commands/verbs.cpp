@@ -10,6 +10,7 @@ void add_all_verbs(CLI::App& app, int& exit_code) {
     add_world_verb(app, exit_code);
     add_fit_verb(app, exit_code);
     add_train_verb(app, exit_code);
+    add_keyshapes_verb(app, exit_code);
     add_pack_verb(app, exit_code);
     add_report_verb(app, exit_code);
     add_solve_verb(app, exit_code);

@@ -43,11 +43,14 @@ struct Experiment {
 [[nodiscard]] bool all_bounds_hold(const ExperimentTable& table);
 
 // The experiments, each in the file of its name.
+[[nodiscard]] Result<ExperimentTable, FileError> chuang02_key_shapes(const std::filesystem::path& data);
+[[nodiscard]] Result<ExperimentTable, FileError> chuang02_non_negative(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> deng06_mistracked(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> deng06_proportions(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> deng06_variance(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> hybrid16_barycentric(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> rbf_dimensions(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> temporal_prior(const std::filesystem::path& data);
+[[nodiscard]] Result<ExperimentTable, FileError> zhang06_regions(const std::filesystem::path& data);
 
 }  // namespace rig::host

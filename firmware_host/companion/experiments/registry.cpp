@@ -7,6 +7,10 @@ namespace rig::host {
 
 std::span<const Experiment> all_experiments() {
     static constexpr std::array kExperiments{
+        Experiment{"chuang02-key-shapes", "Chuang02 Fig. 6: error against the number of key shapes",
+                   chuang02_key_shapes},
+        Experiment{"chuang02-non-negative", "Chuang02 Figs. 4-5: why weights are not negative",
+                   chuang02_non_negative},
         Experiment{"deng06-mistracked", "Deng06 Fig. 7: two badly tracked markers", deng06_mistracked},
         Experiment{"deng06-proportions", "Deng06 Fig. 6: RBF against equation solving, other proportions",
                    deng06_proportions},
@@ -20,6 +24,8 @@ std::span<const Experiment> all_experiments() {
         Experiment{"temporal-prior",
                    "Methods 3.7: what the pull towards the previous solution costs and gives",
                    temporal_prior},
+        Experiment{"zhang06-regions", "Zhang06 section 5.3: small regions against the whole face",
+                   zhang06_regions},
     };
     return kExperiments;
 }

@@ -21,6 +21,10 @@ const char* solver_words(SolverKind solver) {
             return "box-constrained QP";
         case SolverKind::kRbf:
             return "RBF regression";
+        case SolverKind::kKeyShapes:
+            return "non-negative key shapes by regions";
+        case SolverKind::kExamples:
+            return "convex examples by regions";
     }
     return "unknown";
 }

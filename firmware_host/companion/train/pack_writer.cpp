@@ -39,6 +39,33 @@ std::vector<std::byte> bytes_of(std::span<const std::string_view> names) {
     return bytes;
 }
 
+template <class T>
+std::vector<std::byte> joined(std::span<const RegionModel> regions, std::span<const T> RegionModel::* part) {
+    std::vector<std::byte> bytes;
+    for (const RegionModel& region : regions) {
+        const auto raw = std::as_bytes(region.*part);
+        bytes.insert(bytes.end(), raw.begin(), raw.end());
+    }
+    return bytes;
+}
+
+std::vector<std::byte> bytes_of_names(std::span<const RegionModel> regions) {
+    std::vector<std::string_view> names;
+    for (const RegionModel& region : regions) names.push_back(region.name);
+    return bytes_of(names);
+}
+
+std::vector<std::byte> bytes_of_table(std::span<const RegionModel> regions) {
+    std::vector<std::byte> bytes(kRegionRecordBytes * regions.size());
+    for (std::size_t r = 0; r < regions.size(); ++r) {
+        const MutableByteSpan record = MutableByteSpan(bytes).subspan(r * kRegionRecordBytes);
+        store(record, 0, static_cast<std::uint8_t>(regions[r].solver));
+        store(record, 2, regions[r].marker_count);
+        store(record, 4, regions[r].example_count);
+    }
+    return bytes;
+}
+
 std::vector<SectionData> sections_of(const SolvePack& pack, HashFunction hash) {
     std::vector<SectionData> out;
     const auto add = [&](SectionType type, std::vector<std::byte> bytes) {
@@ -65,6 +92,18 @@ std::vector<SectionData> sections_of(const SolvePack& pack, HashFunction hash) {
         add(SectionType::kRbfWidths, bytes_of(pack.rbf.widths_mm));
         add(SectionType::kRbfWeights, bytes_of(pack.rbf.weights));
         add(SectionType::kRbfOffset, bytes_of(pack.rbf.offset));
+    }
+    if (is_regional(pack.solver)) {
+        const std::span regions =
+            std::span(pack.regions).first(std::min<std::size_t>(pack.region_count, kMaxRegions));
+        add(SectionType::kRegionNames, bytes_of_names(regions));
+        add(SectionType::kRegionTable, bytes_of_table(regions));
+        add(SectionType::kRegionMarkers, joined(regions, &RegionModel::markers));
+        add(SectionType::kRegionMarkerBlend, joined(regions, &RegionModel::marker_blend));
+        add(SectionType::kRegionOrigin, joined(regions, &RegionModel::origin_mm));
+        add(SectionType::kRegionExamples, joined(regions, &RegionModel::examples_mm));
+        add(SectionType::kRegionShapes, joined(regions, &RegionModel::shapes));
+        add(SectionType::kRegionShapeBlend, joined(regions, &RegionModel::shape_blend));
     }
     return out;
 }
@@ -160,6 +199,7 @@ std::vector<std::byte> manifest_of(const SolvePack& pack, const PackIdentity& id
     manifest.add_rbf_kernel(static_cast<std::uint8_t>(pack.rbf.kernel));
     manifest.add_rbf_hull_near_widths(pack.rbf.hull_near_widths);
     manifest.add_rbf_hull_far_widths(pack.rbf.hull_far_widths);
+    manifest.add_region_count(pack.region_count);
     fb::FinishManifestBuffer(builder, manifest.Finish());
     const auto raw = std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize()));
     return {raw.begin(), raw.end()};

@@ -62,14 +62,9 @@ void move_to_means(const MatrixXd& rows, const std::vector<Index>& owner, Matrix
 
 }  // namespace
 
-std::vector<Index> choose_reference_frames(const MatrixXd& points, std::size_t count) {
-    const Index stride = std::max<Index>(1, points.rows() / kClusteredFrames);
-    const Index kept = (points.rows() + stride - 1) / stride;
-    MatrixXd rows(kept, points.cols());
-    for (Index r = 0; r < kept; ++r) rows.row(r) = points.row(r * stride);
-    const std::vector<Index> spread = widest_spread(rows, std::max<std::size_t>(count, 1));
-    MatrixXd centres(static_cast<Index>(spread.size()), rows.cols());
-    for (std::size_t k = 0; k < spread.size(); ++k) centres.row(static_cast<Index>(k)) = rows.row(spread[k]);
+FrameClusters cluster_frames(const MatrixXd& rows, const std::vector<Index>& starts) {
+    MatrixXd centres(static_cast<Index>(starts.size()), rows.cols());
+    for (std::size_t k = 0; k < starts.size(); ++k) centres.row(static_cast<Index>(k)) = rows.row(starts[k]);
     std::vector<Index> owner;
     for (int round = 0; round < kLloydRounds; ++round) {
         std::vector<Index> now = assign(rows, centres);
@@ -77,6 +72,16 @@ std::vector<Index> choose_reference_frames(const MatrixXd& points, std::size_t c
         owner = std::move(now);
         move_to_means(rows, owner, centres);
     }
+    return {std::move(centres), std::move(owner)};
+}
+
+std::vector<Index> choose_reference_frames(const MatrixXd& points, std::size_t count) {
+    const Index stride = std::max<Index>(1, points.rows() / kClusteredFrames);
+    const Index kept = (points.rows() + stride - 1) / stride;
+    MatrixXd rows(kept, points.cols());
+    for (Index r = 0; r < kept; ++r) rows.row(r) = points.row(r * stride);
+    const MatrixXd centres =
+        cluster_frames(rows, widest_spread(rows, std::max<std::size_t>(count, 1))).centres;
     std::vector<Index> chosen;
     for (Index k = 0; k < centres.rows(); ++k) {
         Index nearest = 0;

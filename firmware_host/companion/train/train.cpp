@@ -118,6 +118,11 @@ std::string fault_of_options(const TrainOptions& options, std::size_t take_count
                "shape), or "
                "choose --solver boxqp, which needs none";
     }
+    if (is_regional(options.solver) && take_count == 0) {
+        return "regions take their shapes from a performance: give one with --take T.csv (frame,time_s and "
+               "one "
+               "column a shape), or choose --solver boxqp, which needs none";
+    }
     return {};
 }
 
@@ -138,6 +143,8 @@ SolvePack TrainedPack::view() const {
     out.sparsity_mm2 = static_cast<float>(sparsity_mm2);
     out.ridge_mm2 = static_cast<float>(ridge_mm2);
     out.rbf = view_of(rbf);
+    out.region_count = static_cast<std::uint8_t>(std::min(regions.size(), kMaxRegions));
+    for (std::size_t r = 0; r < out.region_count; ++r) out.regions[r] = regions[r].view();
     out.camera_count = static_cast<std::uint8_t>(cameras.size());
     std::ranges::copy(cameras, out.cameras.begin());
     std::ranges::copy(shape_names, out.shape_names.begin());
@@ -171,6 +178,12 @@ Result<TrainedPack, FileError> train(const Rig& rig, const MarkerLayout& layout,
         pack.report.rbf = trained->report;
         pack.report.coverage =
             coverage_of_takes(pack.view().rbf, pack.neutral_mm, pack.basis_mm, options.takes);
+    }
+    if (is_regional(options.solver)) {
+        auto regions = train_regions(options.solver, layout, pack.neutral_mm, pack.basis_mm, options.takes,
+                                     options.regional);
+        if (!regions) return failure(regions.error());
+        pack.regions = std::move(*regions);
     }
     return pack;
 }

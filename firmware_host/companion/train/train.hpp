@@ -13,6 +13,7 @@
 #include "firmware_host/companion/rig_folder/rig_folder.hpp"
 #include "firmware_host/companion/train/coverage.hpp"
 #include "firmware_host/companion/train/rbf_training.hpp"
+#include "firmware_host/companion/train/regional_training.hpp"
 
 namespace rig::host {
 
@@ -38,6 +39,7 @@ struct TrainOptions {
     std::optional<double> sparsity;
     std::optional<double> ridge;
     RbfTrainingOptions rbf;
+    RegionalTrainingOptions regional;
 };
 
 inline constexpr double kDefaultSparsity = 0.01;
@@ -79,13 +81,15 @@ class TrainedPack {
     std::vector<float> neutral_mm, basis_mm, weight_low, weight_high, prior_mean, prior_sigma, temporal_gamma;
     std::vector<CameraModel> cameras;
     TrainedRbf rbf;
+    std::vector<TrainedRegion> regions;
     TrainReport report;
 };
 
 // What is wrong with the options for so many takes, with the remedy; empty when nothing is.
 [[nodiscard]] std::string fault_of_options(const TrainOptions& options, std::size_t take_count);
 
-// Errors: counts outside core's limits, options out of range, an RBF without a take. Deterministic.
+// Errors: counts outside core's limits, options out of range, an RBF or regions without a take.
+// Deterministic.
 [[nodiscard]] Result<TrainedPack, FileError> train(const Rig& rig, const MarkerLayout& layout,
                                                    const TrainOptions& options,
                                                    const TrainingProgress& progress = {});

@@ -3,11 +3,14 @@
 // source is built several times, with other optimisation and other instruction sets;
 // tests/replay/solver_digests compares what they print. "unsupported" where the processor lacks what the
 // build was made for.
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <vector>
 
 #include "core/solve/box_qp.hpp"
+#include "core/solve/nnls.hpp"
+#include "core/solve/simplex_qp.hpp"
 #include "core/solve/solver.hpp"
 #include "tests/support/digest.hpp"
 #include "tests/support/random.hpp"
@@ -67,6 +70,64 @@ void run(std::size_t rows, std::size_t shapes, double ridge, double high, test::
         digest.add(report.kkt);
         digest.add(report.objective);
         digest.add(report.iterations);
+    }
+}
+
+struct alignas(64) Lanes {
+    float values[kLaneFloats];
+};
+
+// One region's examples in both of its solvers; markers come and go. The last example repeats the first where
+// `dependent`.
+void run_region(std::size_t rows, std::size_t count, bool dependent, test::Digest& digest) {
+    const std::size_t stride = padded(count);
+    test::SeededRandom random(7);
+    std::vector<Lanes> examples(rows * stride / kLaneFloats), gram(count * stride / kLaneFloats);
+    float* const g = examples.data()->values;
+    std::vector<double> hessian(count * count, 0.0), linear(count), weights(count);
+    for (std::size_t r = 0; r < rows; ++r) {
+        for (std::size_t i = 0; i < count; ++i)
+            g[r * stride + i] = static_cast<float>(random.normal(0.0, 6.0));
+        if (dependent) g[r * stride + count - 1] = g[r * stride];
+        for (std::size_t i = 0; i < count; ++i) {
+            for (std::size_t j = 0; j < count; ++j)
+                hessian[i * count + j] += static_cast<double>(g[r * stride + i] + 40.0F) *
+                                          static_cast<double>(g[r * stride + j] + 40.0F);
+        }
+    }
+    build_simplex_gram({g, rows * stride}, rows, count, {}, {gram.data()->values, count * stride});
+    std::vector<float> target(rows), row_weight(rows, 1.0F), c(count);
+    const auto state = std::make_unique<SimplexQpState>();
+    const auto workspace = std::make_unique<SimplexQpWorkspace>();
+    const auto nnls = std::make_unique<NnlsState>();
+    const auto nnls_workspace = std::make_unique<NnlsWorkspace>();
+    for (int frame = 0; frame < 60; ++frame) {
+        row_weight[random.below(rows)] = frame % 3 == 0 ? 0.5F : 1.0F;
+        std::fill(linear.begin(), linear.end(), 0.0);
+        for (std::size_t r = 0; r < rows; ++r) {
+            const float mix =
+                0.5F * (g[r * stride + 1] + g[r * stride + static_cast<std::size_t>(frame) % count]);
+            target[r] = mix + static_cast<float>(random.normal(0.0, 2.0));
+            for (std::size_t i = 0; i < count; ++i)
+                linear[i] +=
+                    static_cast<double>(g[r * stride + i] + 40.0F) * static_cast<double>(target[r] + 40.0F);
+        }
+        const SimplexQpReport report = solve_simplex_qp({rows,
+                                                         count,
+                                                         stride,
+                                                         {g, rows * stride},
+                                                         {gram.data()->values, count * stride},
+                                                         target,
+                                                         row_weight,
+                                                         0},
+                                                        {}, *state, *workspace, c);
+        for (const float x : c) digest.add(x);
+        digest.add(report.kkt);
+        digest.add(report.iterations);
+        const BoxQpReport positive =
+            solve_nnls({count, count, hessian, linear}, *nnls, *nnls_workspace, weights);
+        for (const double w : weights) digest.add(w);
+        digest.add(positive.objective);
     }
 }
 
@@ -192,6 +253,9 @@ int main() {
     run<float>(150, 140, 3e-3, 1.0, digest);
     run<double>(66, 12, 1e-6, 1e6, digest);
     run<double>(150, 46, 0.0, 1e6, digest);
+    run_region(60, 12, false, digest);
+    run_region(27, 15, true, digest);
+    run_region(45, 24, true, digest);
     for (const SolverKind solver :
          {SolverKind::kLeastSquares, SolverKind::kNonNegative, SolverKind::kBoxQp, SolverKind::kRbf})
         run_stage(solver, digest);

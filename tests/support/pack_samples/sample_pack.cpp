@@ -1,5 +1,7 @@
 #include "tests/support/pack_samples/sample_pack.hpp"
 
+#include "core/base/float_kernels.hpp"
+
 namespace rig::test {
 
 namespace {
@@ -63,6 +65,7 @@ SamplePack::SamplePack(const SamplePackSize& size) {
         camera.camera_from_headset << 1, 0, 0, 0, -1, 0, 0, 0, -1;
         camera.centre_mm = Vec3(10.0 * static_cast<double>(c), -40.0, 200.0);
     }
+    if (is_regional(size.solver)) add_regions(size);
     if (size.solver != SolverKind::kRbf) return;
     RbfModel& rbf = view.rbf;
     rbf.dimension_count = size.rbf_dimensions;
@@ -80,6 +83,56 @@ SamplePack::SamplePack(const SamplePackSize& size) {
     rbf.widths_mm = rbf_widths;
     rbf.weights = rbf_weights;
     rbf.offset = rbf_offset;
+}
+
+void SamplePack::add_regions(const SamplePackSize& size) {
+    Numbers numbers;
+    regions.resize(2);
+    for (std::uint16_t k = 0; k < size.markers; ++k) {
+        if (k < 3) regions[0].markers.push_back(k);
+        if (k >= 2) regions[1].markers.push_back(k);
+    }
+    const RegionSolver own =
+        size.solver == SolverKind::kExamples ? RegionSolver::kSimplex : RegionSolver::kNonNegative;
+    const RegionSolver other =
+        own == RegionSolver::kSimplex ? RegionSolver::kNonNegative : RegionSolver::kSimplex;
+    for (std::size_t r = 0; r < 2; ++r) {
+        Region& region = regions[r];
+        const std::size_t n = r == 0 ? size.region_examples : 2;
+        const std::size_t m = region.markers.size();
+        region.marker_blend.assign(m, 1.0F);
+        for (std::size_t a = 0; a < m; ++a) {
+            if (region.markers[a] == 2) region.marker_blend[a] = r == 0 ? 0.25F : 0.75F;
+        }
+        const RegionSolver solver = r == 0 ? own : other;
+        region.origin = numbers.many(3 * m, 50.0F);
+        for (std::size_t row = 0; row < 3 * m; ++row) {
+            float sum = 0.0F;
+            for (const std::uint16_t k : region.markers) sum += neutral[3U * k + row % 3];
+            if (solver == RegionSolver::kNonNegative) region.origin[row] = sum / static_cast<float>(m);
+            std::vector<float> examples = numbers.many(n, 10.0F);
+            float middle = 0.0F;
+            for (const float x : examples) middle += x / static_cast<float>(n);
+            for (float& x : examples) x -= solver == RegionSolver::kSimplex ? middle : 0.0F;
+            examples.resize(padded(n), 0.0F);
+            region.examples.insert(region.examples.end(), examples.begin(), examples.end());
+        }
+        region.shapes = numbers.many(n * size.shapes, 0.5F, 0.5F);
+        for (std::size_t i = 0; i < size.shapes; ++i)
+            region.shape_blend.push_back(i == 0 ? 0.5F : i % 2 == r ? 1.0F : 0.0F);
+        RegionModel& model = view.regions[r];
+        model.name = r == 0 ? "upper" : "lower";
+        model.solver = solver;
+        model.marker_count = static_cast<std::uint16_t>(m);
+        model.example_count = static_cast<std::uint16_t>(n);
+        model.markers = region.markers;
+        model.marker_blend = region.marker_blend;
+        model.origin_mm = region.origin;
+        model.examples_mm = region.examples;
+        model.shapes = region.shapes;
+        model.shape_blend = region.shape_blend;
+    }
+    view.region_count = 2;
 }
 
 }  // namespace rig::test

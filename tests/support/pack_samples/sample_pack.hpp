@@ -15,6 +15,7 @@ struct SamplePackSize {
     std::uint16_t rbf_dimensions = 2;  // used by SolverKind::kRbf only
     std::uint16_t rbf_centres = 3;
     std::uint8_t cameras = 1;
+    std::uint16_t region_examples = 3;  // of the first region; the second has 2
 };
 
 // Owns the numbers; `view` points into them, so the object does not move.
@@ -28,6 +29,16 @@ class SamplePack {
     std::vector<float> neutral, basis, low, high, mean, sigma, gamma;
     std::vector<float> rbf_mean, rbf_basis, rbf_centres, rbf_widths, rbf_weights, rbf_offset;
     std::vector<std::string> names;  // shapes, then markers
+
+    // Of regional solvers: two regions, the first of the pack's own kind, that share marker 2 and shape 0.
+    struct Region {
+        std::vector<std::uint16_t> markers;
+        std::vector<float> marker_blend, origin, examples, shapes, shape_blend;
+    };
+    std::vector<Region> regions;
+
+  private:
+    void add_regions(const SamplePackSize& size);
 };
 
 }  // namespace rig::test

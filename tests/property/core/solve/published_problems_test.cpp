@@ -1,7 +1,8 @@
 // Published problems: core's answer and the textbooks' against the printed one, from both sides. A convex
-// combination is solved here by a sequence of box problems; a solver of its own is added to the last test.
+// combination is solved by a sequence of box problems, and by the solver of its own in the last test.
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -13,6 +14,8 @@
 #include <vector>
 
 #include "core/solve/box_qp.hpp"
+#include "core/solve/nnls.hpp"
+#include "core/solve/simplex_qp.hpp"
 #include "tests/support/published_problems.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/textbook_solvers.hpp"
@@ -302,6 +305,71 @@ TEST(PublishedProblems, ConvexCombinations) {
             expect_published(p, x, 1e-9L, condition, hostile ? "hostile" : "cold");
         }
     }
+}
+
+// x >= 0 by the solver of key shapes.
+Numbers solve_non_negative(const PublishedProblem& p) {
+    const auto state = std::make_unique<NnlsState>();
+    const auto workspace = std::make_unique<NnlsWorkspace>();
+    std::vector<double> hessian(p.hessian.begin(), p.hessian.end());
+    std::vector<double> linear;
+    for (const long double q : p.linear) linear.push_back(-static_cast<double>(q));
+    std::vector<double> x(p.size);
+    EXPECT_TRUE(solve_nnls({p.size, p.size, hessian, linear}, *state, *workspace, x).optimal) << p.name;
+    return {x.begin(), x.end()};
+}
+
+// A convex combination by the solver of examples: G with G^T G = H and g with G^T g = -q.
+Numbers solve_of_examples(const PublishedProblem& p) {
+    const auto n = static_cast<Eigen::Index>(p.size);
+    Eigen::MatrixXd h(n, n);
+    Eigen::VectorXd q(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+        q[i] = static_cast<double>(p.linear[static_cast<std::size_t>(i)]);
+        for (Eigen::Index j = 0; j < n; ++j)
+            h(i, j) = static_cast<double>(p.hessian[static_cast<std::size_t>(i * n + j)]);
+    }
+    const Eigen::LLT<Eigen::MatrixXd> factor(h);
+    EXPECT_EQ(factor.info(), Eigen::Success) << p.name;
+    const Eigen::MatrixXd g = factor.matrixU();
+    const Eigen::VectorXd target = factor.matrixL().solve(-q);
+    const std::size_t stride = padded(p.size);
+    struct alignas(64) Lanes {
+        float values[kLaneFloats];
+    };
+    std::vector<Lanes> examples(p.size * stride / kLaneFloats), gram(p.size * stride / kLaneFloats);
+    std::vector<float> measured, c(p.size);
+    for (Eigen::Index r = 0; r < n; ++r) {
+        measured.push_back(static_cast<float>(target[r]));
+        for (Eigen::Index i = 0; i < n; ++i)
+            examples.data()->values[static_cast<std::size_t>(r) * stride + static_cast<std::size_t>(i)] =
+                static_cast<float>(g(r, i));
+    }
+    const std::span<const float> rows{examples.data()->values, p.size * stride};
+    const std::span<float> products{gram.data()->values, p.size * stride};
+    build_simplex_gram(rows, p.size, p.size, {}, products);
+    const auto state = std::make_unique<SimplexQpState>();
+    const auto workspace = std::make_unique<SimplexQpWorkspace>();
+    const SimplexQpReport report = solve_simplex_qp({p.size, p.size, stride, rows, products, measured, {}, 0},
+                                                    {}, *state, *workspace, c);
+    EXPECT_TRUE(report.optimal) << p.name;
+    return {c.begin(), c.end()};
+}
+
+TEST(PublishedProblems, SolversOfRegions) {
+    int non_negative = 0;
+    for (const PublishedProblem& p : problems_of(PublishedKind::kBox)) {
+        const auto from_zero = [](long double x) { return x == 0.0L; };
+        const auto without_end = [](long double x) { return std::isinf(x); };
+        if (p.size > kMaxRegionShapes || !std::all_of(p.low.begin(), p.low.end(), from_zero) ||
+            !std::all_of(p.high.begin(), p.high.end(), without_end))
+            continue;
+        ++non_negative;
+        expect_published(p, solve_non_negative(p), 1e-9L, condition_of(p), "NNLS of a region");
+    }
+    EXPECT_GE(non_negative, 6);
+    for (const PublishedProblem& p : problems_of(PublishedKind::kSimplex))
+        expect_published(p, solve_of_examples(p), 2e-6L, condition_of(p), "simplex QP of a region");
 }
 
 }  // namespace

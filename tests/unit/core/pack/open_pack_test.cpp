@@ -38,8 +38,8 @@ void expect_refused(const SolvePack& pack, PackError error, const PackIdentity& 
 }
 
 TEST(OpenPack, GivesBackWhatWasWritten) {
-    for (const SolverKind solver :
-         {SolverKind::kLeastSquares, SolverKind::kNonNegative, SolverKind::kBoxQp, SolverKind::kRbf}) {
+    for (const SolverKind solver : {SolverKind::kLeastSquares, SolverKind::kNonNegative, SolverKind::kBoxQp,
+                                    SolverKind::kRbf, SolverKind::kKeyShapes, SolverKind::kExamples}) {
         const SamplePack sample({.markers = 7, .shapes = 5, .solver = solver, .cameras = 2});
         const AlignedBytes bytes(write_pack(sample.view, {}, sha256));
         const auto opened = open_pack(bytes.span(), sha256);

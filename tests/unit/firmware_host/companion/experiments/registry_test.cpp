@@ -40,20 +40,33 @@ TEST(AllBoundsHold, IsFalseForOneThatIsMissedOrNoNumber) {
     EXPECT_FALSE(all_bounds_hold(table));
 }
 
+void expect_bounds_hold(const char* name, const std::filesystem::path& data) {
+    const Experiment* experiment = find_experiment(name);
+    ASSERT_NE(experiment, nullptr) << name;
+    const auto table = experiment->run(data);
+    ASSERT_TRUE(table.has_value()) << table.error().message;
+    EXPECT_GE(table->rows.size(), 3U);
+    for (const auto& row : table->rows) EXPECT_EQ(row.size(), table->columns.size());
+    for (const ExperimentBound& bound : table->bounds)
+        EXPECT_TRUE(bound.holds()) << name << ": " << bound.what << " " << bound.value;
+}
+
+TEST(AllExperiments, OfKeyShapesAndRegionsHoldTheirBoundsOnTheRecordedTakes) {
+#ifdef __SANITIZE_ADDRESS__
+    GTEST_SKIP() << "minutes of arithmetic under the sanitizers";
+#endif
+    RIG_SHARED_DATA_OR_SKIP(rig, "rig");
+    for (const char* name : {"chuang02-key-shapes", "chuang02-non-negative", "zhang06-regions"})
+        expect_bounds_hold(name, rig.parent_path());
+}
+
 TEST(AllExperiments, OfDengHoldTheirBoundsOnTheRecordedTakes) {
 #ifdef __SANITIZE_ADDRESS__
     GTEST_SKIP() << "minutes of arithmetic under the sanitizers";
 #endif
     RIG_SHARED_DATA_OR_SKIP(rig, "rig");
     for (const char* name : {"deng06-mistracked", "deng06-proportions", "deng06-variance"}) {
-        const Experiment* experiment = find_experiment(name);
-        ASSERT_NE(experiment, nullptr) << name;
-        const auto table = experiment->run(rig.parent_path());
-        ASSERT_TRUE(table.has_value()) << table.error().message;
-        EXPECT_GE(table->rows.size(), 3U);
-        for (const auto& row : table->rows) EXPECT_EQ(row.size(), table->columns.size());
-        for (const ExperimentBound& bound : table->bounds)
-            EXPECT_TRUE(bound.holds()) << name << ": " << bound.what << " " << bound.value;
+        expect_bounds_hold(name, rig.parent_path());
     }
 }
 
