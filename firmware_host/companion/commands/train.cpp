@@ -205,7 +205,8 @@ Result<void, FileError> estimate_noise(TrainCommand& command, const MarkerLayout
 
 // After training: what the model cannot explain of the same markers.
 void print_residual(const TrainedPack& pack, const MarkerTake& take) {
-    if (pack.solver == SolverKind::kRbf) return;  // a regression has no degrees of freedom to take off
+    // A regression and regions have no degrees of freedom of the weights to take off.
+    if (pack.solver == SolverKind::kRbf || is_regional(pack.solver)) return;
     const MarkerTake thin = thinned(take, kMostFitFrames);
     const auto residual = noise_of_residual(pack.view(), thin, solve_take(pack.view(), thin, true));
     if (!residual) return;
@@ -230,8 +231,7 @@ std::string fault_of_command(TrainCommand& command) {
     }
     const auto method = key_shape_method(command.method);
     if (!method) {
-        print_error(fmt::format("--method {}: give spread, clusters2, clusters3 or hull", command.method));
-        return kExitUsage;
+        return fmt::format("--method {}: give spread, clusters2, clusters3 or hull", command.method);
     }
     command.options.regional.method = *method;
     if (!command.hull_fallback.empty()) {
