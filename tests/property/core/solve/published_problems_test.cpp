@@ -2,7 +2,6 @@
 // combination is solved by a sequence of box problems, and by the solver of its own in the last test.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -329,10 +328,14 @@ Numbers solve_of_examples(const PublishedProblem& p) {
         for (Eigen::Index j = 0; j < n; ++j)
             h(i, j) = static_cast<double>(p.hessian[static_cast<std::size_t>(i * n + j)]);
     }
-    const Eigen::LLT<Eigen::MatrixXd> factor(h);
-    EXPECT_EQ(factor.info(), Eigen::Success) << p.name;
-    const Eigen::MatrixXd g = factor.matrixU();
-    const Eigen::VectorXd target = factor.matrixL().solve(-q);
+    // H = V L V^T; where L is zero, q is too.
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(h);
+    const Eigen::VectorXd roots = parts.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+    const Eigen::MatrixXd g = roots.asDiagonal() * parts.eigenvectors().transpose();
+    Eigen::VectorXd target = parts.eigenvectors().transpose() * -q;
+    for (Eigen::Index r = 0; r < n; ++r)
+        target[r] = roots[r] > 1e-7 * roots.maxCoeff() ? target[r] / roots[r] : 0.0;
+    EXPECT_LT((g.transpose() * target + q).norm(), 1e-9 * (1.0 + q.norm())) << p.name;
     const std::size_t stride = padded(p.size);
     struct alignas(64) Lanes {
         float values[kLaneFloats];
