@@ -4,7 +4,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "core/solve/simplex_qp.hpp"
@@ -89,13 +92,21 @@ long double allowed(const ReferenceSimplexQp& p) {
     return 2e-6L * size + 4e-6L * squares + 1e-12L;
 }
 
+// RIG_SIMPLEX_PROBLEMS=1000000 asks for more than the suite has time for.
+std::size_t problem_count() {
+    const char* text = std::getenv("RIG_SIMPLEX_PROBLEMS");
+    return text != nullptr ? static_cast<std::size_t>(std::stoul(text)) : 9000;
+}
+
 // Random and degenerate problems, each solved cold and along a short walk: feasible, inside the cap, and as
-// good as the reference's long double answer.
+// good as the reference's long double answer; of many problems every hundredth is compared with it.
 TEST(SimplexQpProperties, AsGoodAsTheReferenceOnRandomAndDegenerateProblems) {
     SeededRandom random(21);
-    int optimal = 0;
-    int solves = 0;
-    for (int round = 0; round < 3000; ++round) {
+    const std::size_t rounds = problem_count() / 3;
+    const std::size_t compare_every = rounds > 10'000 ? 100 : 1;
+    std::size_t optimal = 0;
+    std::size_t solves = 0;
+    for (std::size_t round = 0; round < rounds; ++round) {
         const test::SimplexFaceOptions o = random_options(random, 15);
         const std::vector<double> raw = test::simplex_examples(o, random);
         SimplexProblem p(o.rows, o.count, raw);
@@ -105,18 +116,20 @@ TEST(SimplexQpProperties, AsGoodAsTheReferenceOnRandomAndDegenerateProblems) {
             const Solved s = solve_from(p, state);
             expect_feasible(s.c);
             ASSERT_LE(s.report.iterations, SimplexQpConfig{}.iteration_cap);
+            ++solves;
+            optimal += s.report.optimal ? 1 : 0;
+            if (round % compare_every != 0) continue;
             const ReferenceSimplexQp reference = p.reference();
             const long double tolerance = allowed(reference);
             const std::vector<long double> best = test::solve_by_pairs(reference, 0.1L * tolerance, 20000);
             const long double excess = reference.objective(widened(s.c)) - reference.objective(best);
             ASSERT_LE(excess, tolerance)
                 << "round " << round << " frame " << frame << " kkt " << s.report.kkt;
-            ++solves;
-            optimal += s.report.optimal ? 1 : 0;
         }
     }
     // What is not certified is as good as the rest; it must stay rare all the same.
     EXPECT_GE(optimal, solves - solves / 100);
+    std::printf("%zu solves, %zu not certified\n", solves, solves - optimal);
 }
 
 TEST(SimplexQpProperties, EqualsTheExhaustiveReferenceWhereTheAnswerIsUnique) {
