@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "tests/bench/thread_clock.hpp"
 #include "tests/support/synthetic_face.hpp"
 
 namespace rig::test {
@@ -31,12 +32,6 @@ struct Spread {
     double seen = 0.0;        // markers a frame
     double iterations = 0.0;  // of the solve, a frame
 };
-
-double thread_cpu_us() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
-}
 
 // One tick's input, made before the clock starts.
 class TickInput {
@@ -90,9 +85,9 @@ Spread measure(const Case& c, std::size_t frames) {
     std::vector<double> times_us;
     for (std::size_t f = 0; f < frames; ++f) {
         const TickInput input(face, c, f, random);
-        const double began_us = thread_cpu_us();
+        const double began_us = bench::thread_cpu_us();
         input.step(*pipeline, *state, *report);
-        times_us.push_back(thread_cpu_us() - began_us);
+        times_us.push_back(bench::thread_cpu_us() - began_us);
         spread.seen += static_cast<double>(report->markers_seen) / static_cast<double>(frames);
         spread.iterations += static_cast<double>(report->iterations) / static_cast<double>(frames);
     }

@@ -9,7 +9,6 @@
 // beside. Ends with 1 when a frame has no certificate or the heap was called.
 #include <dlib/optimization.h>
 #include <fmt/format.h>
-#include <time.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -21,6 +20,7 @@
 #include "core/solve/simplex_qp.hpp"
 #include "firmware_host/daemon/heap_guard.hpp"
 #include "tests/bench/simplex/floor.hpp"
+#include "tests/bench/thread_clock.hpp"
 #include "tests/support/simplex_problem.hpp"
 
 namespace {
@@ -29,12 +29,6 @@ using namespace rig;
 
 constexpr std::size_t kRegions = 14;
 constexpr int kReplays = 5;
-
-double cpu_us() {
-    timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) * 1e6 + static_cast<double>(t.tv_nsec) * 1e-3;
-}
 
 struct Region {
     std::unique_ptr<test::SimplexProblem> problem;
@@ -148,28 +142,6 @@ struct Outcome {
     std::uint32_t heap_calls = 0;
 };
 
-double median(std::vector<double> v) {
-    std::sort(v.begin(), v.end());
-    return v[v.size() / 2];
-}
-
-double p99(std::vector<double> v) {
-    std::sort(v.begin(), v.end());
-    return v[(v.size() - 1) * 99 / 100];
-}
-
-// A low quantile, not the least: one pair of readings that came out equal would take the cost for nothing and
-// flatter every ratio.
-double clock_overhead_us() {
-    std::vector<double> costs(20'000);
-    for (double& cost : costs) {
-        const double begin = cpu_us();
-        cost = cpu_us() - begin;
-    }
-    std::sort(costs.begin(), costs.end());
-    return costs[costs.size() / 10];
-}
-
 // dlib's solver for one region: minimise 1/2 a^T Q a - a^T b, a >= 0, sum a = 1.
 struct Rival {
     explicit Rival(const SimplexQpProblem& p) {
@@ -238,12 +210,12 @@ class Bench {
         std::vector<SimplexQpState> fresh(anew ? kRegions : 0);
         seal_heap();
         const std::uint32_t before = heap_calls_after_seal();
-        const double begin = cpu_us();
+        const double begin = bench::thread_cpu_us();
         for (std::size_t r = 0; r < kRegions; ++r) {
             reports[r] = solve_simplex_qp(views[r], {}, anew ? fresh[r] : regions[r]->state, *workspace_,
                                           regions[r]->coefficients);
         }
-        out.take(frame, cpu_us() - begin - overhead_us_);
+        out.take(frame, bench::thread_cpu_us() - begin - overhead_us_);
         out.heap_calls += heap_calls_after_seal() - before;
         unseal_heap();
         for (std::size_t r = 0; first && r < kRegions; ++r) out.judge(views[r], *regions[r], reports[r]);
@@ -252,9 +224,9 @@ class Bench {
     void run_floor(std::size_t frame, bool first) {
         std::vector<std::unique_ptr<PackedFloor>> parts;
         for (auto& region : regions) parts.push_back(std::make_unique<PackedFloor>(*region));
-        const double begin = cpu_us();
+        const double begin = bench::thread_cpu_us();
         for (auto& part : parts) sink_ = sink_ + bench::run_floor(part->problem);
-        floor.take(frame, cpu_us() - begin - overhead_us_);
+        floor.take(frame, bench::thread_cpu_us() - begin - overhead_us_);
         for (auto& part : parts) used += first ? static_cast<double>(part->used.size()) : 0.0;
     }
 
@@ -262,9 +234,9 @@ class Bench {
         for (std::size_t r = 0; r < kRegions; ++r)
             rivals_[r].target = dlib::matrix_cast<double>(
                 dlib::mat(views[r].target.data(), static_cast<long>(views[r].rows)));
-        const double begin = cpu_us();
+        const double begin = bench::thread_cpu_us();
         for (Rival& each : rivals_) each.solve();
-        rival.take(frame, cpu_us() - begin - overhead_us_);
+        rival.take(frame, bench::thread_cpu_us() - begin - overhead_us_);
         for (std::size_t r = 0; first && r < kRegions; ++r) {
             std::vector<float> c(views[r].count);
             for (std::size_t i = 0; i < c.size(); ++i)
@@ -275,26 +247,27 @@ class Bench {
 
     std::vector<Rival> rivals_;
     std::unique_ptr<SimplexQpWorkspace> workspace_ = std::make_unique<SimplexQpWorkspace>();
-    double overhead_us_ = clock_overhead_us();
+    double overhead_us_ = bench::clock_cost_us();
     volatile float sink_ = 0.0F;
 };
 
 void print_row(const char* name, Outcome& outcome, double floor_us) {
     std::erase(outcome.us, Outcome::kNever);
-    const double middle = median(outcome.us);
-    fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} |", name, middle, p99(outcome.us), middle / floor_us);
+    const double middle = bench::quantile(outcome.us, 0.5);
+    fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} |", name, middle, bench::quantile(outcome.us, 0.99),
+               middle / floor_us);
     if (outcome.kkt.empty()) {
         fmt::print(" - | - | - | - | - | - |\n");
         return;
     }
     const auto solves = static_cast<double>(outcome.kkt.size());
     if (outcome.iterations == 0.0) {
-        fmt::print(" - | - | {:.1e} | {:.1e} | - | - |\n", p99(outcome.kkt),
+        fmt::print(" - | - | {:.1e} | {:.1e} | - | - |\n", bench::quantile(outcome.kkt, 0.99),
                    *std::max_element(outcome.kkt.begin(), outcome.kkt.end()));
         return;
     }
     fmt::print(" {:.2f} | {:.2f} | {:.1e} | {:.1e} | {} of {} | {} |\n", outcome.iterations / solves,
-               outcome.changes / solves, p99(outcome.kkt),
+               outcome.changes / solves, bench::quantile(outcome.kkt, 0.99),
                *std::max_element(outcome.kkt.begin(), outcome.kkt.end()), outcome.uncertified,
                outcome.kkt.size(), outcome.heap_calls);
 }
@@ -312,7 +285,7 @@ int main(int argc, char** argv) {
 
     Bench bench(frames, noise);
     for (int replay = 0; replay < kReplays; ++replay) bench.replay(replay == 0);
-    const double floor_us = median(bench.floor.us);
+    const double floor_us = bench::quantile(bench.floor.us, 0.5);
     fmt::print("{} regions, {} frames, {:.1f} examples in use; {} warm solves went on in double\n\n",
                kRegions, frames, bench.used / static_cast<double>(frames * kRegions), bench.warm.walked);
     fmt::print(

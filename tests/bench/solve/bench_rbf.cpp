@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,29 +15,13 @@
 #include "core/solve/rbf.hpp"
 #include "firmware_host/daemon/heap_guard.hpp"
 #include "tests/bench/solve/dot_form_floor.hpp"
+#include "tests/bench/thread_clock.hpp"
 #include "tests/support/random.hpp"
 
 namespace rig::test {
 namespace {
 
 constexpr int kReplays = 5;
-
-double thread_cpu_us() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
-}
-
-// What two readings of the clock cost with nothing between them: the median of many.
-double clock_cost_us() {
-    std::vector<double> costs(20001);
-    for (double& cost : costs) {
-        const double start = thread_cpu_us();
-        cost = thread_cpu_us() - start;
-    }
-    std::ranges::nth_element(costs, costs.begin() + 10000);
-    return costs[10000];
-}
 
 struct Size {
     std::size_t markers;
@@ -187,9 +170,9 @@ struct Times {
 
 template <class Work>
 void time_into(double& least_us, double clock_us, Work work) {
-    const double start = thread_cpu_us();
+    const double start = bench::thread_cpu_us();
     work();
-    least_us = std::min(least_us, std::max(0.0, thread_cpu_us() - start - clock_us));
+    least_us = std::min(least_us, std::max(0.0, bench::thread_cpu_us() - start - clock_us));
 }
 
 struct Outcome {
@@ -211,7 +194,7 @@ Outcome measure(const Problem& problem) {
     std::vector<float> weights(problem.pack().shape_count);
     Times times(problem.frames());
     Outcome out;
-    const double clock_us = clock_cost_us();
+    const double clock_us = bench::clock_cost_us();
     seal_heap();
     const std::uint32_t before = heap_calls_after_seal();
     for (int replay = 0; replay < kReplays; ++replay) {

@@ -21,6 +21,7 @@
 
 #include "core/solve/box_qp.hpp"
 #include "core/solve/normal_equations.hpp"
+#include "tests/bench/thread_clock.hpp"
 #include "tests/support/solver_problems.hpp"
 #include "tests/support/textbook_solvers.hpp"
 
@@ -71,28 +72,6 @@ struct Bench {
     double beta = 0.0, pull = 0.0;
     std::vector<double> hessian, low, high;
 };
-
-double now_us() {
-    timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) * 1e6 + static_cast<double>(t.tv_nsec) * 1e-3;
-}
-
-double quantile(std::vector<double> values, double share) {
-    std::sort(values.begin(), values.end());
-    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
-
-// A low quantile, not the least: one pair of readings that came out equal would take the cost for nothing and
-// flatter every ratio.
-double clock_cost_us() {
-    std::vector<double> costs;
-    for (int i = 0; i < 20'000; ++i) {
-        const double a = now_us();
-        costs.push_back(now_us() - a);
-    }
-    return quantile(std::move(costs), 0.1);
-}
 
 // What a method left behind in one frame, judged in double against the frame's own problem.
 struct Judgement {
@@ -146,9 +125,9 @@ double clock_us = 0.0;
 template <typename Work>
 void timed(Work&& work) {
     const std::uint64_t heap = heap_calls.load();
-    const double began = now_us();
+    const double began = bench::thread_cpu_us();
     work();
-    timed_us = now_us() - began - clock_us;
+    timed_us = bench::thread_cpu_us() - began - clock_us;
     timed_heap += heap_calls.load() - heap;
 }
 
@@ -363,11 +342,11 @@ class Rivals {
 };
 
 void print_row(const std::string& problem, const std::string& name, const Row& row, double floor_us) {
-    const double p50 = quantile(row.us, 0.5);
-    const double p99 = quantile(row.us, 0.99);
+    const double p50 = bench::quantile(row.us, 0.5);
+    const double p99 = bench::quantile(row.us, 0.99);
     fmt::print("| {} | {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.1e} | {:.1e} | {:.1f} |\n", problem, name,
-               p50, p99, p50 / floor_us, p99 / floor_us, quantile(row.kkt, 0.99), quantile(row.excess, 1.0),
-               row.heap_calls_a_frame);
+               p50, p99, p50 / floor_us, p99 / floor_us, bench::quantile(row.kkt, 0.99),
+               bench::quantile(row.excess, 1.0), row.heap_calls_a_frame);
 }
 
 struct Options {
@@ -394,9 +373,9 @@ double run_own(const Bench& bench, const Truth& truth, const Options& options, d
                 least[f] = std::min(least[f], own.floor_us(f, truth.previous[f]));
             }
         }
-        floor = quantile(least, 0.5);
+        floor = bench::quantile(least, 0.5);
         fmt::print("| {} | floor | {:.2f} | {:.2f} | 1 | {:.2f} | | | 0 |\n", label, floor,
-                   quantile(least, 0.99), quantile(least, 0.99) / floor);
+                   bench::quantile(least, 0.99), bench::quantile(least, 0.99) / floor);
     }
     std::vector<double> changes, free;
     const Method warm{name + ", warm", [&] { own.reset(); },
@@ -407,8 +386,8 @@ double run_own(const Bench& bench, const Truth& truth, const Options& options, d
                       }};
     const Row row = measure(bench, truth, warm, options.replays);
     print_row(label,
-              fmt::format("{} ({:.0f} free, {:.0f} changes)", warm.name, quantile(free, 0.5),
-                          quantile(changes, 0.5)),
+              fmt::format("{} ({:.0f} free, {:.0f} changes)", warm.name, bench::quantile(free, 0.5),
+                          bench::quantile(changes, 0.5)),
               row, floor);
     const Method cold{name + ", cold", [&] { own.reset(); },
                       [&](std::size_t f, const std::vector<double>& previous, std::vector<double>& w) {
@@ -416,7 +395,7 @@ double run_own(const Bench& bench, const Truth& truth, const Options& options, d
                       },
                       10};
     print_row(label, cold.name, measure(bench, truth, cold, options.replays), floor);
-    return quantile(row.us, 0.5);
+    return bench::quantile(row.us, 0.5);
 }
 
 void run_rivals(const Bench& bench, const Truth& truth, double floor) {
@@ -490,7 +469,7 @@ int main(int argc, char** argv) {
         options.frames = 60;
         options.replays = 1;
     }
-    clock_us = clock_cost_us();
+    clock_us = bench::clock_cost_us();
     fmt::print("{} frames, {} replays, seed {}; the clock's own cost of {:.2f} us is taken off\n\n",
                options.frames, options.replays, options.seed, clock_us);
     fmt::print(
