@@ -15,6 +15,7 @@ constexpr std::size_t kVectorBytes = 32;
 #else
 constexpr std::size_t kVectorBytes = 16;
 #endif
+constexpr std::size_t kTogether = 4;   // rows of a square
 constexpr std::size_t kMostSums = 12;  // kept in registers: hides the latency, leaves room for operands
 
 // GCC takes the attribute's size from a template parameter only through a struct.
@@ -137,11 +138,94 @@ void square_rows(Real* m, std::size_t stride, std::size_t r, std::size_t vectors
 // u[r] u[c] = u[c] u[r] to the bit, so a symmetric matrix stays symmetric.
 template <typename Real, bool kAdd>
 void square(Real* m, std::size_t stride, std::size_t k, const Real* u) {
-    constexpr std::size_t kTogether = 4;
     const std::size_t vectors = Wide<Real>::vectors(k);
     std::size_t r = 0;
     for (; r + kTogether <= k; r += kTogether) square_rows<Real, kAdd, kTogether>(m, stride, r, vectors, u);
     for (; r < k; ++r) square_rows<Real, kAdd, 1>(m, stride, r, vectors, u);
+}
+
+// to := the transpose of a block of four rows and columns, 16 bytes at a time in registers.
+void turn_block(const float* from, float* to, std::size_t stride) {
+    using Four [[gnu::vector_size(16), gnu::aligned(4), gnu::may_alias]] = float;
+    const auto at = [&](std::size_t i) { return *reinterpret_cast<const Four*>(from + i * stride); };
+    const Four a = at(0), b = at(1), c = at(2), d = at(3);
+    const Four ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5);
+    const Four ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Four cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5);
+    const Four cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+    const auto put = [&](std::size_t i, const Four& v) { *reinterpret_cast<Four*>(to + i * stride) = v; };
+    put(0, __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5));
+    put(1, __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7));
+    put(2, __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5));
+    put(3, __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7));
+}
+void turn_block(const double* from, double* to, std::size_t stride) {
+    using Two [[gnu::vector_size(16), gnu::aligned(8), gnu::may_alias]] = double;
+    for (std::size_t r = 0; r < kTogether; r += 2) {
+        for (std::size_t c = 0; c < kTogether; c += 2) {
+            const Two a = *reinterpret_cast<const Two*>(from + r * stride + c);
+            const Two b = *reinterpret_cast<const Two*>(from + (r + 1) * stride + c);
+            *reinterpret_cast<Two*>(to + c * stride + r) = __builtin_shufflevector(a, b, 0, 2);
+            *reinterpret_cast<Two*>(to + (c + 1) * stride + r) = __builtin_shufflevector(a, b, 1, 3);
+        }
+    }
+}
+
+// Vectors u_j [k], rows of a matrix, and what each counts.
+template <typename Real>
+struct Terms {
+    const Real* first;
+    std::size_t stride;
+    const Real* sign;
+    std::size_t count;
+};
+
+// `kSums` neighbouring vectors of kTogether rows, from column c of row r on.
+template <typename Real, std::size_t kSums>
+void squares_strip(Real* m, const Terms<Real>& terms, std::size_t r, std::size_t c) {
+    using W = Wide<Real>;
+    for (std::size_t i = r; i < r + kTogether; ++i) {
+        Real* out = m + i * terms.stride + c;
+        typename W::Vector sum[kSums];
+        for (std::size_t s = 0; s < kSums; ++s) sum[s] = W::at(out + s * W::kLanes);
+        const Real* u = terms.first;
+        for (std::size_t j = 0; j < terms.count; ++j, u += terms.stride) {
+            const Real factor = terms.sign[j] * u[i];
+            for (std::size_t s = 0; s < kSums; ++s) sum[s] += factor * W::at(u + c + s * W::kLanes);
+        }
+        for (std::size_t s = 0; s < kSums; ++s) W::at(out + s * W::kLanes) = sum[s];
+    }
+}
+
+template <typename Real, std::size_t kSums = kMostSums>
+void squares_of(std::size_t sums, Real* m, const Terms<Real>& terms, std::size_t r, std::size_t c) {
+    if constexpr (kSums > 0) {
+        if (sums == kSums) {
+            squares_strip<Real, kSums>(m, terms, r, c);
+        } else {
+            squares_of<Real, kSums - 1>(sums, m, terms, r, c);
+        }
+    }
+}
+
+// From the diagonal to the right, kTogether rows at a time, then the mirror image. A wide vector begins left
+// of the diagonal; what it spoils there the mirror image replaces.
+template <typename Real>
+void squares(Real* m, std::size_t k, const Terms<Real>& terms) {
+    constexpr std::size_t kLanes = Wide<Real>::kLanes;
+    const std::size_t vectors = Wide<Real>::vectors(k);
+    for (std::size_t r = 0; r < k; r += kTogether) {
+        for (std::size_t done = r / kLanes; done < vectors;) {
+            const std::size_t sums = vectors - done < kMostSums ? vectors - done : kMostSums;
+            squares_of(sums, m, terms, r, done * kLanes);
+            done += sums;
+        }
+    }
+    for (std::size_t r = 0; r < k; r += kTogether) {
+        for (std::size_t c = r + kTogether; c < k; c += kTogether) {
+            turn_block(m + r * terms.stride + c, m + c * terms.stride + r, terms.stride);
+        }
+    }
 }
 
 template <typename Real>
@@ -242,6 +326,15 @@ void subtract_square(float* m, std::size_t stride, std::size_t k, const float* u
 }
 void subtract_square(double* m, std::size_t stride, std::size_t k, const double* u) {
     square<double, false>(m, stride, k, u);
+}
+
+void add_squares(float* m, std::size_t stride, std::size_t k, const float* vectors, const float* sign,
+                 std::size_t count) {
+    squares<float>(m, k, {vectors, stride, sign, count});
+}
+void add_squares(double* m, std::size_t stride, std::size_t k, const double* vectors, const double* sign,
+                 std::size_t count) {
+    squares<double>(m, k, {vectors, stride, sign, count});
 }
 
 float room_ahead(const BoxedStep<float>& step, std::size_t n, float* out) {

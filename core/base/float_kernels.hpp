@@ -46,6 +46,14 @@ void add_square(double* m, std::size_t stride, std::size_t k, const double* u);
 void subtract_square(float* m, std::size_t stride, std::size_t k, const float* u);
 void subtract_square(double* m, std::size_t stride, std::size_t k, const double* u);
 
+// m := m + sum_j sign[j] u_j u_j^T in one pass, sign[j] = 1 or -1, `count` terms in order; u_j begins at
+// vectors + j stride, each zero from k to padded(k). m is symmetric, stays exactly so, and has padded(k) rows
+// of padded(k), zeros behind k.
+void add_squares(float* m, std::size_t stride, std::size_t k, const float* vectors, const float* sign,
+                 std::size_t count);
+void add_squares(double* m, std::size_t stride, std::size_t k, const double* vectors, const double* sign,
+                 std::size_t count);
+
 // The arrays of the following have room for padded(n), zeros behind n.
 
 template <typename Real>

@@ -37,7 +37,8 @@ FloatVector exp_of(FloatVector x) {
     const FloatVector r = (x - k * kLn2High) - k * kLn2Low;  // |r| <= ln2 / 2
     const FloatVector value = polynomial(kExp, r) * (r * r) + r + 1.0F;
     // The integer k stands in the low bits of `shifted`; moved into the exponent it multiplies by 2^k.
-    const FloatVector scaled = floats_of(bits_of(value) + (bits_of(shifted) << 23));
+    // Unsigned, because what is out of range wraps here and is replaced below.
+    const FloatVector scaled = floats_of(plus_wrapping(bits_of(value), bits_of(shifted) << 23));
     const FloatVector bounded =
         x > kMostExponent ? all_floats(std::numeric_limits<float>::infinity()) : scaled;
     const FloatVector floored = x < kLeastExponent ? all_floats(0.0F) : bounded;

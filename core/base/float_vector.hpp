@@ -45,4 +45,16 @@ inline void store_floats(float* to, FloatVector values) {
     return out;
 }
 
+// a + b modulo 2^32.
+[[nodiscard]] inline IntVector plus_wrapping(IntVector a, IntVector b) {
+    using UnsignedVector = std::uint32_t __attribute__((vector_size(kFloatVectorBytes)));
+    UnsignedVector ua;
+    UnsignedVector ub;
+    std::memcpy(&ua, &a, sizeof(ua));
+    std::memcpy(&ub, &b, sizeof(ub));
+    ua += ub;
+    std::memcpy(&a, &ua, sizeof(a));
+    return a;
+}
+
 }  // namespace rig

@@ -15,7 +15,9 @@ constexpr std::size_t kNone = kMaxUnknowns;
 constexpr double kAccepted = 10.0;  // tolerances: rounding leaves this much on ill-conditioned faces
 constexpr double kRoughly = 1e3;    // tolerances: a face solved this well tells which bounds to leave
 constexpr double kReleaseShare =
-    0.25;  // of the largest wrong multiplier; smaller ones wait for the next round
+    0.1;  // of the largest wrong multiplier; smaller ones wait for the next round
+constexpr double kPullShare =
+    0.25;  // of a multiplier: what the step of those freed before has to leave of it
 constexpr std::size_t kReleaseAtOnce = 8;
 constexpr std::uint16_t kFacesUnwatched = 16;
 constexpr std::uint16_t kIdleFaces =
@@ -88,6 +90,7 @@ class FaceWalk {
     bool stagnates();
     bool release();
     std::size_t choose_candidates();
+    [[nodiscard]] bool still_pulls(std::size_t i);
     bool rebuild_once();
     void rebuild();
     void fix(std::size_t slot, Where where);
@@ -379,7 +382,7 @@ std::size_t FaceWalk<Real>::choose_candidates() {
         ws_.candidates[count++] = static_cast<std::uint16_t>(i);
     }
     std::swap(ws_.candidates[0], ws_.candidates[best]);
-    return moved_ ? std::min(count, kReleaseAtOnce) : 1;
+    return moved_ ? count : 1;
 }
 
 // Frees variables whose multipliers have the wrong sign; false when there are none. Several at once keep the
@@ -393,8 +396,9 @@ bool FaceWalk<Real>::release() {
         if (!has_step_) free_.find_step();
         has_step_ = true;
         std::size_t added = 0;
-        for (std::size_t c = 0; c < count; ++c) {
+        for (std::size_t c = 0; c < count && added < kReleaseAtOnce; ++c) {
             const std::size_t i = ws_.candidates[c];
+            if (added > 0 && !still_pulls(i)) continue;
             if (free_.add(i, s_.answer[i])) {
                 set_where(i, Where::kFree);
                 unpin(i);
@@ -408,6 +412,16 @@ bool FaceWalk<Real>::release() {
         if (added > 0) return true;
     }
     return false;
+}
+
+// Whether variable i would still leave its bound once those freed before it have made their step. Most of the
+// others of a family would not, and would only be walked back.
+template <typename Real>
+bool FaceWalk<Real>::still_pulls(std::size_t i) {
+    const Real before = ws_.gradient[i];
+    const Real after = free_.gradient_after_step(i);
+    const Real least = static_cast<Real>(kPullShare) * std::fabs(before);
+    return before > Real(0) ? after > least : after < -least;
 }
 
 template <typename Real>
@@ -517,6 +531,7 @@ double FaceWalk<Real>::objective() const {
 
 template <typename Real>
 void FaceWalk<Real>::certify() {
+    free_.settle_inverse();
     if (!fresh_) refresh_gradient();
     find_moves();
     scale_tolerance();

@@ -11,8 +11,9 @@
 // least squares [Chuang02 eq. 4] is its special case low = 0, high = infinity.
 //
 // A frame differs from the one before by a few variables that reach or leave a bound. Each such change costs
-// one rank-one update of the k x k inverse (2 k^2 multiplications), each face of the box that is solved one
-// product with it and one gradient (k^2 + k N). Real is float for problems with a ridge or a temporal pull of
+// one rank-one update of the k x k inverse (k^2 multiply-adds, half of that where several are made together)
+// and, when a variable comes, one product with it; each face of the box that is solved one product and one
+// gradient (k^2 + k N). Real is float for problems with a ridge or a temporal pull of
 // at least 1e-4 of H's mean diagonal, double for those without: float's inverse wears out on them.
 #pragma once
 
@@ -74,6 +75,8 @@ struct BoxQpState {
     alignas(64) std::array<Real, kMaxUnknowns * kInverseStride> inverse{};  // [k x k], zeros beyond
 };
 
+inline constexpr std::size_t kBoxQpPending = 8;  // changes of the inverse that wait to be made together
+
 template <typename Real>
 struct BoxQpWorkspace {
     alignas(64) std::array<Real, kMaxUnknowns> gradient{};       // H w + q
@@ -83,6 +86,10 @@ struct BoxQpWorkspace {
     alignas(64) std::array<Real, kMaxUnknowns> column{};
     alignas(64) std::array<Real, kMaxUnknowns> direction{};
     alignas(64) std::array<Real, kMaxUnknowns> moving{};
+    // During a solve the inverse is the state's and sum_j sign[j] u_j u_j^T of the changes that wait.
+    alignas(64) std::array<Real, kBoxQpPending * BoxQpState<Real>::kInverseStride> pending{};
+    std::array<Real, kBoxQpPending> sign{};
+    std::array<Real, kBoxQpPending> share{};
     std::array<std::uint16_t, kMaxUnknowns> index{};
     std::array<std::uint16_t, kMaxUnknowns> candidates{};
 };

@@ -123,6 +123,31 @@ TYPED_TEST(FloatKernels, SquaresKeepAMatrixSymmetricToTheBit) {
     }
 }
 
+// One pass gives what the terms one after the other give, to the bit.
+TYPED_TEST(FloatKernels, SquaresTogetherEqualSquaresInTurn) {
+    using Real = TypeParam;
+    test::SeededRandom random(16);
+    for (std::size_t k = 1; k < 120; k += k < 40 ? 1 : 13) {
+        const std::size_t stride = row_stride(k);
+        std::vector<Real> m(padded(k) * stride, Real(0));
+        std::vector<Real> expected = m;
+        for (const std::size_t count : {1U, 2U, 8U, 13U}) {
+            std::vector<Real> vectors = this->numbers(count * stride, random);
+            std::vector<Real> sign(count);
+            for (std::size_t j = 0; j < count; ++j) {
+                sign[j] = random.chance(0.5) ? Real(1) : Real(-1);
+                for (std::size_t i = k; i < stride; ++i) vectors[j * stride + i] = Real(0);
+                const Real* u = vectors.data() + j * stride;
+                if (sign[j] > Real(0)) add_square(expected.data(), stride, k, u);
+                if (sign[j] < Real(0)) subtract_square(expected.data(), stride, k, u);
+            }
+            add_squares(m.data(), stride, k, vectors.data(), sign.data(), count);
+            for (std::size_t i = 0; i < m.size(); ++i)
+                ASSERT_EQ(m[i], expected[i]) << "k " << k << " row " << i / stride;
+        }
+    }
+}
+
 // What lies behind n is skipped as far as the vectors allow, and nothing before it changes.
 TYPED_TEST(FloatKernels, NarrowRowsGiveTheSameNumbers) {
     using Real = TypeParam;
