@@ -485,7 +485,9 @@ int main(int argc, char** argv) {
         const Truth truth = exact(bench);
         double floor = 0.0;
         const double p50 = run_own<float>(bench, truth, options, 1e-6, "core, float", floor);
-        if (family.kind == 'a') run_own<double>(bench, truth, options, 3e-6, "core, double", floor);
+        // As tight as the stage asks for where nothing regularises: with a loose one the objective of a
+        // 150x140 is off by more than a millionth on some seeds.
+        if (family.kind == 'a') run_own<double>(bench, truth, options, 1e-9, "core, double", floor);
         if (options.rivals) run_rivals(bench, truth, floor);
         if (family.kind == 'b' && family.rows == 306 && family.shapes == 46) smallest = p50;
         if (family.kind == 'b' && family.shapes == 280) largest = p50;
