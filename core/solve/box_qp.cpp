@@ -15,11 +15,11 @@ constexpr std::size_t kNone = kMaxUnknowns;
 constexpr double kAccepted = 10.0;  // tolerances: rounding leaves this much on ill-conditioned faces
 constexpr double kRoughly = 1e3;    // tolerances: a face solved this well tells which bounds to leave
 constexpr double kReleaseShare =
-    0.1;  // of the largest wrong multiplier; smaller ones wait for the next round
-constexpr double kPullShare =
-    0.25;  // of a multiplier: what the step of those freed before has to leave of it
-constexpr std::size_t kReleaseAtOnce = 8;
+    0.1;                            // of the dearest wrong multiplier; cheaper ones wait for the next round
+constexpr double kPullShare = 0.5;  // of a multiplier: what the step of those freed before has to leave of it
+constexpr std::size_t kReleaseAtOnce = 16;
 constexpr std::uint16_t kFacesUnwatched = 16;
+constexpr std::uint8_t kSpared = 31;  // solves after a rebuild in vain
 constexpr std::uint16_t kIdleFaces =
     3;  // in a row without descent: the inverse is made anew, or that was all
 
@@ -87,6 +87,7 @@ class FaceWalk {
     [[nodiscard]] Real free_residual() const;
     bool walk();
     bool next_face();
+    void judge_rebuild();
     bool stagnates();
     bool release();
     std::size_t choose_candidates();
@@ -110,6 +111,7 @@ class FaceWalk {
     Real tolerance_;                                              // of weights, see BoxQpConfig
     Real last_residual_ = std::numeric_limits<Real>::infinity();  // after the last full step on this face
     Real largest_move_ = Real(0);
+    Real blunt_residual_ = Real(0);  // that no step lessened, when the inverse was made anew for it
     double least_objective_ = std::numeric_limits<double>::infinity();
     std::uint16_t faces_ = 0;       // solved
     std::uint16_t idle_faces_ = 0;  // since the objective last fell
@@ -140,8 +142,10 @@ void FaceWalk<Real>::adopt_start() {
     if (!same || s_.hessian_version != p_.hessian_version) {
         for (std::size_t i = 0; i < n; ++i) {
             s_.scale[i] = Real(1) / std::max(diagonal(i), kLeastDiagonal<Real>);
+            s_.price[i] = Real(1);
         }
         s_.hessian_version = p_.hessian_version;
+        s_.spared = 0;
         s_.inverse_valid = false;
     }
     if (same && s_.inverse_valid && s_.settled && unmoved()) {
@@ -347,8 +351,20 @@ bool FaceWalk<Real>::next_face() {
         }
     }
     if (contracting) return true;
+    if (s_.spared > 0) return false;
+    blunt_residual_ = residual;
     last_residual_ = std::numeric_limits<Real>::infinity();
     return rebuild_once();
+}
+
+// A rebuild that was not needed for the certificate, or did not bring it, was in vain: it is rounding that
+// stops the residual, and the next frame's would be in vain too.
+template <typename Real>
+void FaceWalk<Real>::judge_rebuild() {
+    if (s_.spared > 0) --s_.spared;
+    if (blunt_residual_ == Real(0)) return;
+    const bool needed = blunt_residual_ > static_cast<Real>(kAccepted) * tolerance_;
+    if (!needed || !report_.optimal) s_.spared = kSpared;
 }
 
 // Whether the objective has stopped falling: what multipliers still say is rounding, and following them would
@@ -364,16 +380,19 @@ bool FaceWalk<Real>::stagnates() {
     return idle_faces_ >= kIdleFaces;
 }
 
-// The variables to free next, the one that pulls most first. When the last round moved nothing, that one
-// only: it cannot be blocked at once, and so rounds do not repeat.
+// The variables to free next, the dearest of those that pull first. When the last round moved nothing, that
+// one only: it cannot be blocked at once, and so rounds do not repeat.
 template <typename Real>
 std::size_t FaceWalk<Real>::choose_candidates() {
     find_moves();
     if (!(largest_move_ > tolerance_)) return 0;
-    for (std::size_t i = 0; i < padded(p_.size); ++i) ws_.moving[i] = ws_.moves[i] * s_.open[i];
+    for (std::size_t i = 0; i < padded(p_.size); ++i) {
+        const Real pull = ws_.moves[i] * s_.open[i];
+        ws_.moving[i] = pull > tolerance_ ? pull * s_.price[i] : Real(0);
+    }
     const Real largest = largest_product(ws_.moving.data(), nullptr, p_.size);
-    if (!(largest > tolerance_)) return 0;
-    const Real least = moved_ ? std::max(tolerance_, static_cast<Real>(kReleaseShare) * largest) : largest;
+    if (!(largest > Real(0))) return 0;
+    const Real least = moved_ ? static_cast<Real>(kReleaseShare) * largest : largest;
     std::size_t count = 0;
     std::size_t best = 0;
     for (std::size_t i = 0; i < p_.size; ++i) {
@@ -545,6 +564,7 @@ void FaceWalk<Real>::certify() {
     report_.kkt = sound != 0 ? static_cast<double>(largest_move_) : std::numeric_limits<double>::max();
     report_.objective = sound != 0 ? objective() : 0.0;
     report_.optimal = report_.kkt <= kAccepted * static_cast<double>(tolerance_);
+    judge_rebuild();
     s_.settled = !skipped_;
     if (sound == 0) s_.warm = false;  // nothing of this is worth keeping
 }

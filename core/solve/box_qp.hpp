@@ -53,7 +53,8 @@ struct BoxQpState {
 
     bool warm = false;  // false: the next solve starts from its weights alone
     bool inverse_valid = false;
-    bool settled = false;  // what is kept below belongs to `answer` in these bounds
+    bool settled = false;     // what is kept below belongs to `answer` in these bounds
+    std::uint8_t spared = 0;  // solves to come in which the inverse is not made anew for sharpness
     std::uint32_t hessian_version = 0;
     std::uint16_t size = 0;          // N
     std::uint16_t free_count = 0;    // k
@@ -66,6 +67,8 @@ struct BoxQpState {
     alignas(64) std::array<Real, kMaxUnknowns> scale{};    // 1 / H_ii
     alignas(64) std::array<Real, kMaxUnknowns> low{};
     alignas(64) std::array<Real, kMaxUnknowns> high{};
+    // What a multiplier counts for: 1 / sqrt(share of H_ii that the free ones left when i last came or went).
+    alignas(64) std::array<Real, kMaxUnknowns> price{};
     alignas(64) std::array<Real, kMaxUnknowns> open{};  // 1 where the variable may be freed, else 0
     // Of the free variables, in the order of the inverse's rows; zeros beyond.
     alignas(64) std::array<Real, kMaxUnknowns> value{};
@@ -108,9 +111,9 @@ struct BoxQpReport {
 [[nodiscard]] constexpr std::uint64_t box_qp_work_budget(std::uint64_t n) {
     return (n + 1) * (n + 1) * (2 * (n + 1) + 512);
 }
-// and never does more than this: the last step may free eight variables and make the inverse anew.
+// and never does more than this: the last step may free sixteen variables and make the inverse anew.
 [[nodiscard]] constexpr std::uint64_t box_qp_work_cap(std::uint64_t n) {
-    return box_qp_work_budget(n) + (n + 1) * (n + 1) * (n + 1 + 32);
+    return box_qp_work_budget(n) + (n + 1) * (n + 1) * (n + 1 + 64);
 }
 
 // On entry `w` holds a start (any numbers; clamped), on return the answer, finite and inside the bounds for

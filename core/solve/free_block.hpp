@@ -14,12 +14,17 @@ namespace rig {
 template <typename Real>
 inline constexpr Real kDependentShare = sizeof(Real) == 4 ? Real(4e-6) : Real(1e-11);
 template <typename Real>
+inline constexpr Real kLeastShare = Real(1e-6);  // that a price knows
+template <typename Real>
 inline constexpr Real kLeastDiagonal = sizeof(Real) == 4 ? Real(1e-12) : Real(1e-20);  // moves nothing
 
-// Free variables from which changes of the inverse wait for each other: below, what a product has to add for
-// those that wait costs more than making them at once.
+// Changes of an inverse of k rows that wait for each other: each adds 2 k to a product, and spares half a
+// pass over the inverse.
 template <typename Real>
-inline constexpr std::size_t kWaitFrom = sizeof(Real) == 4 ? 40 : 28;
+[[nodiscard]] constexpr std::size_t changes_that_wait(std::size_t k) {
+    if (k < 16) return 1;
+    return k < (sizeof(Real) == 4 ? 40 : 28) ? 4 : kBoxQpPending;
+}
 
 template <typename Real>
 class FreeBlock {
@@ -78,6 +83,7 @@ class FreeBlock {
         const Real rest = project_column(i);
         if (!(rest > kDependentShare<Real> * diagonal) || !(diagonal > kLeastDiagonal<Real>)) return false;
         const Real scale = Real(1) / rest;
+        set_price(i, rest * s_.scale[i]);
         const Real pull =
             padded_dot(ws_.column.data(), ws_.free_gradient.data(), padded(k)) - ws_.gradient[i];
         const Real root = std::sqrt(scale);
@@ -87,7 +93,7 @@ class FreeBlock {
         ws_.free_gradient[k] = ws_.gradient[i];
         place(k, i, x);
         ++s_.free_count;
-        if (pending_ == kBoxQpPending || count() < kWaitFrom<Real>) settle_inverse();
+        if (pending_ >= changes_that_wait<Real>(count())) settle_inverse();
         return true;
     }
 
@@ -97,6 +103,7 @@ class FreeBlock {
         const std::size_t last = k - 1;
         find_row(slot);
         const Real scale = Real(1) / ws_.column[slot];
+        set_price(s_.free[slot], scale * s_.free_scale[slot]);
         defer(k, Real(-1), std::sqrt(std::max(scale, Real(0))), ws_.step[slot] * scale);
         if (slot != last) {
             std::copy_n(row(last), last, row(slot));
@@ -115,7 +122,7 @@ class FreeBlock {
             (*kept)[last] = Real(0);
         }
         s_.free_count = static_cast<std::uint16_t>(last);
-        if (pending_ == kBoxQpPending || count() < kWaitFrom<Real>) settle_inverse();
+        if (pending_ >= changes_that_wait<Real>(count())) settle_inverse();
     }
 
     // The free variables' values and bounds beside each other.
@@ -170,6 +177,12 @@ class FreeBlock {
             u[a] = ws_.column[a] * root;
         }
         ws_.sign[pending_++] = sign;
+    }
+
+    // share: of H_ii, left beyond the span of the free columns. Among similar shapes little is left, and what
+    // a multiplier then gains is large for its size (steepest edge; Forrest and Goldfarb 1992).
+    void set_price(std::size_t i, Real share) {
+        s_.price[i] = Real(1) / std::sqrt(share > kLeastShare<Real> ? share : kLeastShare<Real>);
     }
 
     void place(std::size_t slot, std::size_t i, Real x) {
