@@ -96,6 +96,9 @@ class Pipeline {
     StabiliserOutput stabilised_;
     StabiliserReport stabiliser_report_;
 
+    FaceGaussian face_gaussian_;
+    FaceGaussianWorkspace face_gaussian_workspace_;
+    InferenceWorkspace inference_workspace_;
     InferenceOutput completed_;
 
     SolverConfig solver_config_;

@@ -18,6 +18,8 @@ struct Scene {
         auto scratch = std::make_unique<ShapeModelWorkspace>();
         build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
                           *model);
+        auto gaussian_scratch = std::make_unique<FaceGaussianWorkspace>();
+        build_face_gaussian(pack, *model, *gaussian_scratch, *gaussian);
     }
 
     void see(const std::vector<Vec3>& positions, const std::vector<Mat3>& informations) {
@@ -30,13 +32,15 @@ struct Scene {
             named->markers[k].information = informations[k];
         }
         stabilise(*model, config, *named, *state, *workspace, *stabilised, report);
-        infer_missing(*model, *stabilised, *output);
+        infer_missing(*gaussian, *stabilised, *inference, *output);
     }
 
     test::SyntheticFace face{{}};
     StabiliserConfig config;
     StabiliserReport report;
     std::unique_ptr<ShapeModel> model = std::make_unique<ShapeModel>();
+    std::unique_ptr<FaceGaussian> gaussian = std::make_unique<FaceGaussian>();
+    std::unique_ptr<InferenceWorkspace> inference = std::make_unique<InferenceWorkspace>();
     std::unique_ptr<StabiliserState> state = std::make_unique<StabiliserState>();
     std::unique_ptr<StabiliserWorkspace> workspace = std::make_unique<StabiliserWorkspace>();
     std::unique_ptr<NamedMarkers> named = std::make_unique<NamedMarkers>();
