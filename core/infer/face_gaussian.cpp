@@ -62,10 +62,10 @@ void build_precision(FaceGaussianWorkspace& w, FaceGaussian& face) {
         solve_lower(w.factor.data(), d, kMaxModes, v);
         for (std::size_t s = 0; s <= r; ++s) {
             const double shared = -dot(v, w.whitened.data() + s * kMaxModes, d);
-            face.precision[r * rows + s] = shared;
-            face.precision[s * rows + r] = shared;
+            face.precision[r * kMaxRows + s] = shared;
+            face.precision[s * kMaxRows + r] = shared;
         }
-        face.precision[r * rows + r] += weight;
+        face.precision[r * kMaxRows + r] += weight;
     }
 }
 
@@ -75,6 +75,8 @@ void build_face_gaussian(const SolvePack& pack, const ShapeModel& model, FaceGau
                          FaceGaussian& face) {
     RIG_CHECK(pack.marker_count <= kMaxMarkers);
     const auto noise_mm = static_cast<double>(pack.noise_mm);
+    face.modes.fill(0.0);  // kernels read rows to their end
+    face.precision.fill(0.0);
     face.marker_count = pack.marker_count;
     face.noise_mm2 = noise_mm * noise_mm;
     if (pack.marker_set_count > 0) {

@@ -6,12 +6,16 @@
 #include <array>
 #include <cstdint>
 
+#include "core/base/float_kernels.hpp"
 #include "core/base/linalg.hpp"
 #include "core/geometry/shape_model.hpp"
 #include "core/limits.hpp"
 #include "core/pack/solve_pack.hpp"
 
 namespace rig {
+
+// Rows of both matrices are zero behind their last column: kernels read them to a multiple of kLaneFloats.
+static_assert(kMaxModes % kLaneFloats == 0 && kMaxRows % kLaneFloats == 0);
 
 // Marker k: mean_mm[k] + modes c + e, c ~ N(0, I), e ~ N(0, residual_mm2[k] I); measured with noise_mm2 I.
 // Face frame, mm.
@@ -20,10 +24,11 @@ struct FaceGaussian {
     std::uint16_t mode_count = 0;
     double noise_mm2 = 0.0;  // of one measured coordinate
     std::array<Vec3, kMaxMarkers> mean_mm{};
-    std::array<double, kMaxRows * kMaxModes> modes{};     // rows x0, y0, z0, x1, ..., kMaxModes apart
-    std::array<double, kMaxMarkers> residual_mm2{};       // of one coordinate: what the modes leave
-    std::array<double, kMaxMarkers> prior_mm2{};          // trace of the marker's covariance
-    std::array<double, kMaxRows * kMaxRows> precision{};  // of the measured coordinates, rows 3m apart
+    std::array<double, kMaxRows * kMaxModes> modes{};  // rows x0, y0, z0, x1, ..., kMaxModes apart
+    std::array<double, kMaxMarkers> residual_mm2{};    // of one coordinate: what the modes leave
+    std::array<double, kMaxMarkers> prior_mm2{};       // trace of the marker's covariance
+    // Of the measured coordinates; rows kMaxRows apart, zeros behind 3m.
+    std::array<double, kMaxRows * kMaxRows> precision{};
 
     [[nodiscard]] const double* mode_row(std::size_t row) const { return modes.data() + row * kMaxModes; }
 };

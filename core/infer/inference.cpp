@@ -5,6 +5,7 @@
 
 #include "core/base/check.hpp"
 #include "core/base/dense.hpp"
+#include "core/base/float_kernels.hpp"
 #include "core/geometry/triangulation.hpp"
 
 namespace rig {
@@ -19,7 +20,8 @@ constexpr double kMeasuredShare = 0.25;
 constexpr double kFarthestSpreads = 6.0;  // from the mean face; a Gaussian is there once in 1e8 frames
 
 static_assert(InferenceWorkspace::kMaxHiddenRows >= kMaxModes);
-constexpr std::size_t kStride = InferenceWorkspace::kMaxHiddenRows;
+constexpr std::size_t kStride = InferenceWorkspace::kStride;
+using Prepared = InferenceWorkspace::Prepared;
 
 // What a frame tells of one marker. What it weighs depends on this marker alone: were it taken for better
 // known because others are hidden, a confidence could rise when a marker is hidden.
@@ -52,49 +54,55 @@ Mat3 partial_weight(const Mat3& information, double nominal, double residual_mm2
     return 0.5 * (weight + weight.transpose());
 }
 
-struct Estimate {
-    Vec3 position_mm;
-    double variance_mm2;  // trace of the posterior covariance
-};
-
 // Multiply-adds of the two ways, for this many hidden markers.
 bool precision_is_cheaper(const FaceGaussian& face, std::size_t hidden) {
     const std::size_t n = 3 * hidden;
     const std::size_t d = face.mode_count;
     const std::size_t rows = 3U * face.marker_count;
     if (n > InferenceWorkspace::kMaxHiddenRows) return false;
-    return n * n * n / 3 + n * rows <= (rows - n) * d * d / 2 + d * d * d / 6 + n * d * d / 2;
+    return n * n * n / 3 <= (rows - n) * d * d / 2 + d * d * d / 3 + n * d * d / 2;
+}
+
+// x := L^-T L^-1 right, through `half`.
+void solve_prepared(std::size_t n, InferenceWorkspace& w, double* x) {
+    for (std::size_t i = 0; i < n; ++i)
+        w.half[i] = dot(w.inverse.data() + i * kStride, w.right.data(), i + 1);
+    combine_rows(w.inverse.data(), kStride, w.half.data(), n, n, nullptr, x);
+}
+
+std::size_t hidden_row(const InferenceWorkspace& w, std::size_t i) {
+    return 3U * w.hidden[i / 3] + i % 3;
 }
 
 // Conditional of the hidden rows h given the others: covariance (Q_hh)^-1, mean -(Q_hh)^-1 Q_hs e_s.
-bool solve_by_precision(const FaceGaussian& face, std::size_t hidden, InferenceWorkspace& w) {
+bool prepare_by_precision(const FaceGaussian& face, std::size_t hidden, InferenceWorkspace& w) {
     const std::size_t n = 3 * hidden;
-    const std::size_t rows = 3U * face.marker_count;
-    const auto row_of = [&](std::size_t i) { return 3U * w.hidden[i / 3] + i % 3; };
     for (std::size_t i = 0; i < n; ++i) {
-        const double* q = face.precision.data() + row_of(i) * rows;
-        for (std::size_t j = 0; j <= i; ++j) w.factor[i * kStride + j] = q[row_of(j)];
-        w.right[i] = -dot(q, w.error_mm.data(), rows);
+        const double* q = face.precision.data() + hidden_row(w, i) * kMaxRows;
+        for (std::size_t j = i; j < n; ++j) w.system[i * kStride + j] = q[hidden_row(w, j)];
     }
-    if (!cholesky(w.factor.data(), w.factor.data(), n, kStride)) return false;
-    solve_lower(w.factor.data(), n, kStride, w.right.data());
-    solve_lower_transposed(w.factor.data(), n, kStride, w.right.data());
-    // Column j of L^-1, whose squares sum to entry j of the covariance's diagonal; it is zero above j.
-    for (std::size_t j = 0; j < n; ++j) {
-        std::array<double, InferenceWorkspace::kMaxHiddenRows> column;
-        double sum = 0.0;
-        for (std::size_t i = j; i < n; ++i) {
-            const double* l = w.factor.data() + i * kStride;
-            const double right = i == j ? 1.0 : 0.0;
-            column[i] = (right - dot(l + j, column.data() + j, i - j)) / l[i];
-            sum += column[i] * column[i];
-        }
-        w.variance_mm2[j] = sum;
+    if (!inverse_of_factor(w.system.data(), n, kStride, w.inverse.data(), w.half.data())) return false;
+    // The diagonal of the covariance: the squares of each column of L^-1.
+    std::fill_n(w.right.data(), n, 0.0);
+    for (std::size_t i = 0; i < n; ++i) {
+        const double* row = w.inverse.data() + i * kStride;
+        for (std::size_t j = 0; j <= i; ++j) w.right[j] += row[j] * row[j];
+    }
+    for (std::size_t i = 0; i < hidden; ++i) {
+        // The conditional is that of another measurement; its noise is not the marker's.
+        w.variance_mm2[w.hidden[i]] =
+            w.right[3 * i] + w.right[3 * i + 1] + w.right[3 * i + 2] - 3.0 * face.noise_mm2;
     }
     return true;
 }
 
-// Adds M^T W M to the lower triangle and M^T W e to the right side.
+Mat3 weight_of(const FaceGaussian& face, const StabilisedMarker& marker, std::size_t k, Knowledge knowledge) {
+    if (knowledge == Knowledge::kPartly)
+        return partial_weight(marker.information, 1.0 / face.noise_mm2, face.residual_mm2[k]);
+    return Mat3{Mat3::Identity() / (face.noise_mm2 + face.residual_mm2[k])};
+}
+
+// Adds M^T W M to the upper triangle.
 void add_marker(const FaceGaussian& face, std::size_t marker, const Mat3& weight, InferenceWorkspace& w) {
     const std::size_t d = face.mode_count;
     const double* m0 = face.mode_row(3 * marker);
@@ -108,56 +116,22 @@ void add_marker(const FaceGaussian& face, std::size_t marker, const Mat3& weight
     const double* w0 = w.weighted.data();
     const double* w1 = w0 + kMaxModes;
     const double* w2 = w1 + kMaxModes;
-    const double* e = w.error_mm.data() + 3 * marker;
     for (std::size_t i = 0; i < d; ++i) {
-        double* out = w.factor.data() + i * kStride;
-        for (std::size_t j = 0; j <= i; ++j) out[j] += m0[i] * w0[j] + m1[i] * w1[j] + m2[i] * w2[j];
-        w.right[i] += w0[i] * e[0] + w1[i] * e[1] + w2[i] * e[2];
+        double* out = w.system.data() + i * kStride;
+        for (std::size_t j = i; j < d; ++j) out[j] += m0[i] * w0[j] + m1[i] * w1[j] + m2[i] * w2[j];
     }
 }
 
-Mat3 weight_of(const FaceGaussian& face, const StabilisedMarker& marker, std::size_t k, Knowledge knowledge) {
-    if (knowledge == Knowledge::kPartly)
-        return partial_weight(marker.information, 1.0 / face.noise_mm2, face.residual_mm2[k]);
-    return Mat3{Mat3::Identity() / (face.noise_mm2 + face.residual_mm2[k])};
-}
-
-// The coefficients' normal equations; their answer is in right, their factor in factor.
-bool solve_by_modes(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w) {
-    const std::size_t d = face.mode_count;
-    for (std::size_t i = 0; i < d; ++i) {
-        std::fill_n(w.factor.data() + i * kStride, d, 0.0);
-        w.factor[i * kStride + i] = 1.0;
-        w.right[i] = 0.0;
-    }
-    for (std::size_t k = 0; k < face.marker_count; ++k) {
-        const auto knowledge = static_cast<Knowledge>(w.knowledge[k]);
-        if (knowledge == Knowledge::kHidden) continue;
-        add_marker(face, k, weight_of(face, stabilised.markers[k], k, knowledge), w);
-    }
-    if (!cholesky(w.factor.data(), w.factor.data(), d, kStride)) return false;
-    solve_lower(w.factor.data(), d, kStride, w.right.data());
-    solve_lower_transposed(w.factor.data(), d, kStride, w.right.data());
-    return true;
-}
-
-// x = M c + e given what was measured of this marker too: with K = I - r W,
-//   mean K M c + r W y,  covariance r K + K M P M^T K^T   (W = 0 when nothing was).
-Estimate estimate_by_modes(const FaceGaussian& face, const StabilisedMarker& marker, std::size_t k,
-                           InferenceWorkspace& w) {
+// Of x = M c + e given what was measured of this marker too, with K = I - r W (W = 0 when nothing was):
+//   covariance r K + K M P M^T K^T.
+double variance_by_modes(const FaceGaussian& face, std::size_t k, const Mat3& weight, InferenceWorkspace& w) {
     const std::size_t d = face.mode_count;
     const double r = face.residual_mm2[k];
-    const auto knowledge = static_cast<Knowledge>(w.knowledge[k]);
-    const Mat3 weight =
-        knowledge == Knowledge::kPartly ? weight_of(face, marker, k, knowledge) : Mat3{Mat3::Zero()};
     const Mat3 kept = Mat3::Identity() - r * weight;
-    Vec3 predicted = Vec3::Zero();
     for (std::size_t axis = 0; axis < 3; ++axis) {
         const double* row = face.mode_row(3 * k + axis);
-        predicted[static_cast<Eigen::Index>(axis)] = dot(row, w.right.data(), d);
         double* v = w.weighted.data() + axis * kMaxModes;
-        std::copy_n(row, d, v);
-        solve_lower(w.factor.data(), d, kStride, v);
+        for (std::size_t i = 0; i < d; ++i) v[i] = dot(w.inverse.data() + i * kStride, row, i + 1);
     }
     Mat3 spread;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -165,11 +139,36 @@ Estimate estimate_by_modes(const FaceGaussian& face, const StabilisedMarker& mar
             spread(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) =
                 dot(w.weighted.data() + a * kMaxModes, w.weighted.data() + b * kMaxModes, d);
     }
-    const double* e = w.error_mm.data() + 3 * k;
-    const Vec3 own = weight * Vec3{e[0], e[1], e[2]};
     const Mat3 narrowed = kept * spread;
     const Mat3 covariance = r * kept + narrowed * kept.transpose();
-    return {face.mean_mm[k] + kept * predicted + r * own, covariance.trace()};
+    return covariance.trace();
+}
+
+// What a marker that is not measured whole tells of itself.
+Mat3 own_weight(const FaceGaussian& face, const StabiliserOutput& stabilised, std::size_t k,
+                const InferenceWorkspace& w) {
+    const auto knowledge = static_cast<Knowledge>(w.knowledge[k]);
+    return knowledge == Knowledge::kHidden ? Mat3{Mat3::Zero()}
+                                           : weight_of(face, stabilised.markers[k], k, knowledge);
+}
+
+// The coefficients' normal equations.
+bool prepare_by_modes(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w) {
+    const std::size_t d = face.mode_count;
+    for (std::size_t i = 0; i < d; ++i) {
+        std::fill_n(w.system.data() + i * kStride, d, 0.0);
+        w.system[i * kStride + i] = 1.0;
+    }
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kHidden) continue;
+        add_marker(face, k, own_weight(face, stabilised, k, w), w);
+    }
+    if (!inverse_of_factor(w.system.data(), d, kStride, w.inverse.data(), w.half.data())) return false;
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kMeasured) continue;
+        w.variance_mm2[k] = variance_by_modes(face, k, own_weight(face, stabilised, k, w), w);
+    }
+    return true;
 }
 
 Vec3 within_reach(const FaceGaussian& face, std::size_t k, const Vec3& position_mm) {
@@ -191,11 +190,11 @@ Vec3 with_own_measurement(const StabilisedMarker& marker, const Vec3& inferred_m
     return inferred_mm + inverse_3x3(system) * offset;
 }
 
-void put(const FaceGaussian& face, const StabilisedMarker& marker, std::size_t k, const Estimate& estimate,
-         InferenceOutput& output) {
-    const Vec3 inferred = within_reach(face, k, estimate.position_mm);
-    const double variance = std::clamp(estimate.variance_mm2, 0.0, face.prior_mm2[k]);
+void put(const FaceGaussian& face, const StabilisedMarker& marker, std::size_t k, const Vec3& estimate_mm,
+         double variance_mm2, InferenceOutput& output) {
+    const Vec3 inferred = within_reach(face, k, estimate_mm);
     const double usual = face.prior_mm2[k];
+    const double variance = std::clamp(variance_mm2, 0.0, usual);
     output.position_mm[k] =
         marker.seen && marker.information.trace() > 0.0 ? with_own_measurement(marker, inferred) : inferred;
     output.deviation_mm[k] = static_cast<float>(std::sqrt(variance));
@@ -227,18 +226,71 @@ Census classify(const FaceGaussian& face, const StabiliserOutput& stabilised, In
 
 void put_by_precision(const FaceGaussian& face, const StabiliserOutput& stabilised, std::size_t hidden,
                       InferenceWorkspace& w, InferenceOutput& output) {
+    const std::size_t n = 3 * hidden;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double* q = face.precision.data() + hidden_row(w, i) * kMaxRows;
+        w.right[i] = -padded_dot(q, w.error_mm.data(), padded(3U * face.marker_count));
+    }
+    solve_prepared(n, w, w.right.data());
     for (std::size_t i = 0; i < hidden; ++i) {
         const std::size_t k = w.hidden[i];
-        const double* offset = w.right.data() + 3 * i;
-        const double* v = w.variance_mm2.data() + 3 * i;
-        // The conditional is that of another measurement; its noise is not the marker's.
-        const double variance = v[0] + v[1] + v[2] - 3.0 * face.noise_mm2;
-        const Estimate estimate{face.mean_mm[k] + Vec3{offset[0], offset[1], offset[2]}, variance};
-        put(face, stabilised.markers[k], k, estimate, output);
+        const Vec3 offset{w.right[3 * i], w.right[3 * i + 1], w.right[3 * i + 2]};
+        put(face, stabilised.markers[k], k, face.mean_mm[k] + offset, w.variance_mm2[k], output);
     }
 }
 
+// Mean of x: K M c + r W y.
+void put_by_modes(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w,
+                  InferenceOutput& output) {
+    const std::size_t rows = 3U * face.marker_count;
+    const auto error_of = [&](std::size_t k) {
+        return Vec3{w.error_mm[3 * k], w.error_mm[3 * k + 1], w.error_mm[3 * k + 2]};
+    };
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        const Vec3 weighted = own_weight(face, stabilised, k, w) * error_of(k);
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            w.half[3 * k + axis] = weighted[static_cast<Eigen::Index>(axis)];
+    }
+    combine_rows(face.modes.data(), kMaxModes, w.half.data(), rows, face.mode_count, nullptr, w.right.data());
+    solve_prepared(face.mode_count, w, w.right.data());
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kMeasured) continue;
+        const Mat3 own = face.residual_mm2[k] * own_weight(face, stabilised, k, w);
+        Vec3 predicted;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            predicted[static_cast<Eigen::Index>(axis)] =
+                dot(face.mode_row(3 * k + axis), w.right.data(), face.mode_count);
+        }
+        const Vec3 correction = own * (error_of(k) - predicted);
+        put(face, stabilised.markers[k], k, face.mean_mm[k] + predicted + correction, w.variance_mm2[k],
+            output);
+    }
+}
+
+// What hides where decides all that prepare() works out, unless a marker is partly measured.
+bool is_prepared(const FaceGaussian& face, const Census& census, const InferenceWorkspace& w) {
+    return w.prepared != Prepared::kNothing && census.partly == 0 &&
+           std::equal(w.knowledge.begin(), w.knowledge.begin() + face.marker_count, w.prepared_for.begin());
+}
+
+void prepare(const FaceGaussian& face, const StabiliserOutput& stabilised, const Census& census,
+             InferenceWorkspace& w) {
+    w.prepared = Prepared::kNothing;
+    if (census.partly == 0 && precision_is_cheaper(face, census.hidden) &&
+        prepare_by_precision(face, census.hidden, w)) {
+        w.prepared = Prepared::kPrecision;
+    } else if (prepare_by_modes(face, stabilised, w)) {
+        w.prepared = Prepared::kModes;
+    }
+    w.prepared_for = w.knowledge;
+}
+
 }  // namespace
+
+void reset_inference(InferenceWorkspace& workspace) {
+    workspace.prepared = Prepared::kNothing;
+    workspace.error_mm.fill(0.0);
+}
 
 void infer_missing(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w,
                    InferenceOutput& output) {
@@ -253,18 +305,20 @@ void infer_missing(const FaceGaussian& face, const StabiliserOutput& stabilised,
     }
     const Census census = classify(face, stabilised, w);
     if (census.hidden + census.partly == 0) return;
-    if (census.partly == 0 && precision_is_cheaper(face, census.hidden) &&
-        solve_by_precision(face, census.hidden, w)) {
-        put_by_precision(face, stabilised, census.hidden, w, output);
-        return;
+    if (!is_prepared(face, census, w)) prepare(face, stabilised, census, w);
+    switch (w.prepared) {
+        case Prepared::kPrecision:
+            put_by_precision(face, stabilised, census.hidden, w, output);
+            return;
+        case Prepared::kModes:
+            put_by_modes(face, stabilised, w, output);
+            return;
+        case Prepared::kNothing:  // not positive definite to working precision: the mean face
+            break;
     }
-    const bool solved = solve_by_modes(face, stabilised, w);
     for (std::size_t k = 0; k < face.marker_count; ++k) {
         if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kMeasured) continue;
-        const StabilisedMarker& marker = stabilised.markers[k];
-        const Estimate estimate =
-            solved ? estimate_by_modes(face, marker, k, w) : Estimate{face.mean_mm[k], face.prior_mm2[k]};
-        put(face, marker, k, estimate, output);
+        put(face, stabilised.markers[k], k, face.mean_mm[k], face.prior_mm2[k], output);
     }
 }
 

@@ -53,6 +53,7 @@ Result<void, PipelineError> Pipeline::configure(const SolvePack& pack, const Pip
     build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, model_workspace_,
                       model_);
     build_face_gaussian(pack, model_, face_gaussian_workspace_, face_gaussian_);
+    reset_inference(inference_workspace_);
     configure_solver(pack, config.rate_hz, solver_workspace_, solver_config_);
     configure_stages(config);
     for (std::size_t i = 0; i < pack.shape_count; ++i) sent_[i] = rest(pack, i);

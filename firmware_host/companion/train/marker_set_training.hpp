@@ -27,11 +27,11 @@ struct ExpressionSpread {
 // Of these expressions alone [K x N], K >= 1.
 [[nodiscard]] ExpressionSpread spread_of_expressions(const Eigen::MatrixXd& weights);
 
-// What a pack is trained with: a mixture of all frames of the takes and, for a tenth, of any face the rig can
-// make, so that what a take never showed is unlikely, not impossible. Without frames the rig alone.
+// What a pack is trained with: a mixture of all frames of the takes and, for kRigShare, of any face the rig
+// can make, so that what a take never showed is unlikely, not impossible. Without frames the rig alone.
 [[nodiscard]] ExpressionSpread spread_of_takes(std::span<const Take> takes, std::size_t shape_count);
 
-inline constexpr double kRigShare = 0.1;
+inline constexpr double kRigShare = 0.02;
 
 struct MarkerSetOptions {
     std::size_t face_modes = kMaxModes;  // of the whole face, from which the device infers; 1..kMaxModes
