@@ -53,6 +53,8 @@ struct Experiment {
 [[nodiscard]] Result<ExperimentTable, FileError> missing_markers(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> rbf_dimensions(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> temporal_prior(const std::filesystem::path& data);
+[[nodiscard]] Result<ExperimentTable, FileError> zhang06_motion_model(const std::filesystem::path& data);
+[[nodiscard]] Result<ExperimentTable, FileError> zhang06_propagation(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> zhang06_regions(const std::filesystem::path& data);
 
 }  // namespace rig::host

@@ -26,6 +26,11 @@ std::span<const Experiment> all_experiments() {
         Experiment{"temporal-prior",
                    "Methods 3.7: what the pull towards the previous solution costs and gives",
                    temporal_prior},
+        Experiment{"zhang06-motion-model",
+                   "Zhang06 section 12: similarity against affine map, head motion in the image",
+                   zhang06_motion_model},
+        Experiment{"zhang06-propagation", "Zhang06 Fig. 12: motion propagation from 17 points",
+                   zhang06_propagation},
         Experiment{"zhang06-regions", "Zhang06 section 5.3: small regions against the whole face",
                    zhang06_regions},
     };
