@@ -169,7 +169,11 @@ bool inverse_of_factor(double* a, std::size_t n, std::size_t stride, double* inv
         double* row = inverse + i * stride;
         const double scale = 1.0 / a[i * stride + i];
         for (std::size_t j = 0; j < i; ++j) scratch[j] = -scale * a[j * stride + i];
-        combine_rows(inverse, stride, scratch, i, i, nullptr, row);
+        // Rows above the columns' first are zero in them.
+        for (std::size_t c = 0; c < i; c += kLaneFloats) {
+            const std::size_t width = i - c < kLaneFloats ? i - c : kLaneFloats;
+            combine_rows(inverse + c * stride + c, stride, scratch + c, i - c, width, nullptr, row + c);
+        }
         row[i] = scale;
     }
     return true;

@@ -79,7 +79,8 @@ bool prepare_by_precision(const FaceGaussian& face, std::size_t hidden, Inferenc
     const std::size_t n = 3 * hidden;
     for (std::size_t i = 0; i < n; ++i) {
         const double* q = face.precision.data() + hidden_row(w, i) * kMaxRows;
-        for (std::size_t j = i; j < n; ++j) w.system[i * kStride + j] = q[hidden_row(w, j)];
+        for (std::size_t b = i / 3; b < hidden; ++b)
+            std::copy_n(q + 3U * w.hidden[b], 3, w.system.data() + i * kStride + 3 * b);
     }
     if (!inverse_of_factor(w.system.data(), n, kStride, w.inverse.data(), w.half.data())) return false;
     // The diagonal of the covariance: the squares of each column of L^-1.
