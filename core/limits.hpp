@@ -20,6 +20,7 @@ inline constexpr std::size_t kMaxRbfCentres = 256;    // reference frames of one
 inline constexpr std::size_t kMaxRbfDimensions = 32;  // principal components kept; the sources use 4 to 20
 inline constexpr std::size_t kMaxRegions = 16;        // solved on their own; the sources use 3 and 14
 inline constexpr std::size_t kMaxRegionShapes = 32;  // key shapes or examples of one; the sources use 8 to 15
+inline constexpr std::size_t kMaxMarkerSets = 24;    // overlapping, for unseen markers; the source has 21
 inline constexpr std::size_t kMaxWindowFrames = 61;  // of a smoothing filter: a second at 60 Hz
 inline constexpr std::size_t kMaxControlPairs = 128;  // of each kind an artist may tie: every shape once
 inline constexpr std::size_t kMaxImageWidth = 1920;   // px
@@ -52,6 +53,8 @@ static_assert(4 * (kMaxRows * kMaxShapes + kMaxRbfDimensions * kMaxRows + kMaxRb
 static_assert(4 * kMaxRegions *
                   (kMaxRows * (kMaxRegionShapes + 3) + kMaxRegionShapes * kMaxShapes + kMaxShapes) <=
               kMaxPackBytes / 2);
+// ... and every marker set with the whole face in it
+static_assert(4 * kMaxMarkerSets * kMaxRows * (kMaxModes + 3) <= kMaxPackBytes / 2);
 static_assert(kMaxModes <= kMaxShapes);
 static_assert(kMaxShapes <= kMaxUnknowns);
 static_assert(kMaxDotDiameterPx + 16 <= kBlobWindowPx);

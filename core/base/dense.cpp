@@ -147,6 +147,38 @@ void symmetric_inverse(const double* l, std::size_t n, std::size_t stride, doubl
     }
 }
 
+bool inverse_of_factor(double* a, std::size_t n, std::size_t stride, double* inverse, double* scratch,
+                       double floor) {
+    RIG_CHECK(stride >= n + kLaneFloats && a != inverse);
+    double largest = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (a[i * stride + i] > largest) largest = a[i * stride + i];
+        for (std::size_t j = n; j < n + kLaneFloats; ++j) a[i * stride + j] = 0.0;
+        for (std::size_t j = 0; j < padded(n); ++j) inverse[i * stride + j] = 0.0;
+    }
+    // Row i of L^T from the rows above it.
+    for (std::size_t i = 0; i < n; ++i) {
+        double* row = a + i * stride + i;
+        for (std::size_t j = 0; j < i; ++j) scratch[j] = -a[j * stride + i];
+        combine_rows(a + i, stride, scratch, i, n - i, row, row);
+        if (!(row[0] > floor * largest)) return false;  // also refuses NaN
+        const double scale = 1.0 / std::sqrt(row[0]);
+        for (std::size_t j = 0; j < n - i; ++j) row[j] *= scale;
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+        double* row = inverse + i * stride;
+        const double scale = 1.0 / a[i * stride + i];
+        for (std::size_t j = 0; j < i; ++j) scratch[j] = -scale * a[j * stride + i];
+        // Rows above the columns' first are zero in them.
+        for (std::size_t c = 0; c < i; c += kLaneFloats) {
+            const std::size_t width = i - c < kLaneFloats ? i - c : kLaneFloats;
+            combine_rows(inverse + c * stride + c, stride, scratch + c, i - c, width, nullptr, row + c);
+        }
+        row[i] = scale;
+    }
+    return true;
+}
+
 void symmetric_eigen(double* a, std::size_t n, std::size_t stride, double* values, double* vectors) {
     RIG_CHECK(stride >= n);
     double total = 0.0;

@@ -27,6 +27,13 @@ void solve_lower_transposed(const double* l, std::size_t n, std::size_t stride, 
 // `inverse`; stride is at least padded(n) (float_kernels.hpp); scratch holds n doubles. n^3 / 2 operations.
 void symmetric_inverse(const double* l, std::size_t n, std::size_t stride, double* inverse, double* scratch);
 
+// L^-1 of a = L L^T, symmetric and positive definite: `a` (its upper triangle is read) becomes L^T, and
+// `inverse` the lower triangle of L^-1 with zeros to its right, up to padded(n). Rows of both are `stride`
+// apart, stride at least n + kLaneFloats; scratch holds n doubles. n^3 / 3 operations, all in wide rows.
+// False as cholesky().
+[[nodiscard]] bool inverse_of_factor(double* a, std::size_t n, std::size_t stride, double* inverse,
+                                     double* scratch, double floor = 1e-14);
+
 // Eigenvalues (falling) and eigenvectors (column j of `vectors` belongs to values[j]) of the symmetric n x n
 // matrix `a`, which is destroyed. Cyclic Jacobi, at most 30 sweeps. For set-up, not for frames: about 10 n^3
 // operations.

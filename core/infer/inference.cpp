@@ -1,5 +1,11 @@
 #include "core/infer/inference.hpp"
 
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/check.hpp"
+#include "core/base/dense.hpp"
+#include "core/base/float_kernels.hpp"
 #include "core/geometry/triangulation.hpp"
 
 namespace rig {
@@ -9,27 +15,311 @@ namespace {
 constexpr double kSmallestDepthShare =
     1e-6;                            // of a marker's mean information: below it the depth was not measured
 constexpr double kWeakPrior = 0.01;  // of a marker's mean information
+// A marker counts as measured when it is known at least half as well as the pack expects along every axis.
+constexpr double kMeasuredShare = 0.25;
+constexpr double kFarthestSpreads = 6.0;  // from the mean face; a Gaussian is there once in 1e8 frames
+
+static_assert(InferenceWorkspace::kMaxHiddenRows >= kMaxModes);
+constexpr std::size_t kStride = InferenceWorkspace::kStride;
+using Prepared = InferenceWorkspace::Prepared;
+
+// What a frame tells of one marker. What it weighs depends on this marker alone: were it taken for better
+// known because others are hidden, a confidence could rise when a marker is hidden.
+enum class Knowledge : std::uint8_t { kHidden = 0, kPartly = 1, kMeasured = 2 };
+
+bool is_at_least(const Mat3& information, double floor) {
+    const Mat3 rest = information - floor * Mat3::Identity();
+    const double two = rest(0, 0) * rest(1, 1) - rest(0, 1) * rest(1, 0);
+    return rest(0, 0) >= 0.0 && two >= 0.0 && rest.determinant() >= 0.0;
+}
+
+Knowledge knowledge_of(const StabilisedMarker& marker, double nominal) {
+    if (!marker.seen || !(marker.information.trace() > 0.0)) return Knowledge::kHidden;
+    return is_at_least(marker.information, kMeasuredShare * nominal) ? Knowledge::kMeasured
+                                                                     : Knowledge::kPartly;
+}
+
+// Of a partly measured marker, about modes' prediction: A (I + r A)^-1, A scaled down where it claims more
+// than a measured marker has.
+Mat3 partial_weight(const Mat3& information, double nominal, double residual_mm2) {
+    double largest = 0.0;  // over the sums of rows: no eigenvalue is larger
+    for (int i = 0; i < 3; ++i) {
+        const double sum =
+            std::fabs(information(i, 0)) + std::fabs(information(i, 1)) + std::fabs(information(i, 2));
+        largest = std::max(largest, sum);
+    }
+    const Mat3 capped = information * std::min(1.0, nominal / largest);
+    const Mat3 grown = Mat3::Identity() + residual_mm2 * capped;
+    const Mat3 weight = capped * inverse_3x3(grown);
+    return 0.5 * (weight + weight.transpose());
+}
+
+// Multiply-adds of the two ways, for this many hidden markers.
+bool precision_is_cheaper(const FaceGaussian& face, std::size_t hidden) {
+    const std::size_t n = 3 * hidden;
+    const std::size_t d = face.mode_count;
+    const std::size_t rows = 3U * face.marker_count;
+    if (n > InferenceWorkspace::kMaxHiddenRows) return false;
+    return n * n * n / 3 <= (rows - n) * d * d / 2 + d * d * d / 3 + n * d * d / 2;
+}
+
+// x := L^-T L^-1 right, through `half`.
+void solve_prepared(std::size_t n, InferenceWorkspace& w, double* x) {
+    for (std::size_t i = 0; i < n; ++i)
+        w.half[i] = dot(w.inverse.data() + i * kStride, w.right.data(), i + 1);
+    combine_rows(w.inverse.data(), kStride, w.half.data(), n, n, nullptr, x);
+}
+
+std::size_t hidden_row(const InferenceWorkspace& w, std::size_t i) {
+    return 3U * w.hidden[i / 3] + i % 3;
+}
+
+// Conditional of the hidden rows h given the others: covariance (Q_hh)^-1, mean -(Q_hh)^-1 Q_hs e_s.
+bool prepare_by_precision(const FaceGaussian& face, std::size_t hidden, InferenceWorkspace& w) {
+    const std::size_t n = 3 * hidden;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double* q = face.precision.data() + hidden_row(w, i) * kMaxRows;
+        for (std::size_t b = i / 3; b < hidden; ++b)
+            std::copy_n(q + 3U * w.hidden[b], 3, w.system.data() + i * kStride + 3 * b);
+    }
+    if (!inverse_of_factor(w.system.data(), n, kStride, w.inverse.data(), w.half.data())) return false;
+    // The diagonal of the covariance: the squares of each column of L^-1.
+    std::fill_n(w.right.data(), n, 0.0);
+    for (std::size_t i = 0; i < n; ++i) {
+        const double* row = w.inverse.data() + i * kStride;
+        for (std::size_t j = 0; j <= i; ++j) w.right[j] += row[j] * row[j];
+    }
+    for (std::size_t i = 0; i < hidden; ++i) {
+        // The conditional is that of another measurement; its noise is not the marker's.
+        w.variance_mm2[w.hidden[i]] =
+            w.right[3 * i] + w.right[3 * i + 1] + w.right[3 * i + 2] - 3.0 * face.noise_mm2;
+    }
+    return true;
+}
+
+Mat3 weight_of(const FaceGaussian& face, const StabilisedMarker& marker, std::size_t k, Knowledge knowledge) {
+    if (knowledge == Knowledge::kPartly)
+        return partial_weight(marker.information, 1.0 / face.noise_mm2, face.residual_mm2[k]);
+    return Mat3{Mat3::Identity() / (face.noise_mm2 + face.residual_mm2[k])};
+}
+
+// Adds M^T W M to the upper triangle.
+void add_marker(const FaceGaussian& face, std::size_t marker, const Mat3& weight, InferenceWorkspace& w) {
+    const std::size_t d = face.mode_count;
+    const double* m0 = face.mode_row(3 * marker);
+    const double* m1 = m0 + kMaxModes;
+    const double* m2 = m1 + kMaxModes;
+    for (Eigen::Index a = 0; a < 3; ++a) {
+        double* row = w.weighted.data() + static_cast<std::size_t>(a) * kMaxModes;
+        for (std::size_t j = 0; j < d; ++j)
+            row[j] = weight(a, 0) * m0[j] + weight(a, 1) * m1[j] + weight(a, 2) * m2[j];
+    }
+    const double* w0 = w.weighted.data();
+    const double* w1 = w0 + kMaxModes;
+    const double* w2 = w1 + kMaxModes;
+    for (std::size_t i = 0; i < d; ++i) {
+        double* out = w.system.data() + i * kStride;
+        for (std::size_t j = i; j < d; ++j) out[j] += m0[i] * w0[j] + m1[i] * w1[j] + m2[i] * w2[j];
+    }
+}
+
+// Of x = M c + e given what was measured of this marker too, with K = I - r W (W = 0 when nothing was):
+//   covariance r K + K M P M^T K^T.
+double variance_by_modes(const FaceGaussian& face, std::size_t k, const Mat3& weight, InferenceWorkspace& w) {
+    const std::size_t d = face.mode_count;
+    const double r = face.residual_mm2[k];
+    const Mat3 kept = Mat3::Identity() - r * weight;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double* row = face.mode_row(3 * k + axis);
+        double* v = w.weighted.data() + axis * kMaxModes;
+        for (std::size_t i = 0; i < d; ++i) v[i] = dot(w.inverse.data() + i * kStride, row, i + 1);
+    }
+    Mat3 spread;
+    for (std::size_t a = 0; a < 3; ++a) {
+        for (std::size_t b = 0; b < 3; ++b)
+            spread(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) =
+                dot(w.weighted.data() + a * kMaxModes, w.weighted.data() + b * kMaxModes, d);
+    }
+    const Mat3 narrowed = kept * spread;
+    const Mat3 covariance = r * kept + narrowed * kept.transpose();
+    return covariance.trace();
+}
+
+// What a marker that is not measured whole tells of itself.
+Mat3 own_weight(const FaceGaussian& face, const StabiliserOutput& stabilised, std::size_t k,
+                const InferenceWorkspace& w) {
+    const auto knowledge = static_cast<Knowledge>(w.knowledge[k]);
+    return knowledge == Knowledge::kHidden ? Mat3{Mat3::Zero()}
+                                           : weight_of(face, stabilised.markers[k], k, knowledge);
+}
+
+// The coefficients' normal equations.
+bool prepare_by_modes(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w) {
+    const std::size_t d = face.mode_count;
+    for (std::size_t i = 0; i < d; ++i) {
+        std::fill_n(w.system.data() + i * kStride, d, 0.0);
+        w.system[i * kStride + i] = 1.0;
+    }
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kHidden) continue;
+        add_marker(face, k, own_weight(face, stabilised, k, w), w);
+    }
+    if (!inverse_of_factor(w.system.data(), d, kStride, w.inverse.data(), w.half.data())) return false;
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kMeasured) continue;
+        w.variance_mm2[k] = variance_by_modes(face, k, own_weight(face, stabilised, k, w), w);
+    }
+    return true;
+}
+
+Vec3 within_reach(const FaceGaussian& face, std::size_t k, const Vec3& position_mm) {
+    const Vec3 offset = position_mm - face.mean_mm[k];
+    const double reach = kFarthestSpreads * std::sqrt(face.prior_mm2[k]);
+    const double length = std::sqrt(offset.dot(offset));
+    if (length <= reach) return position_mm;
+    if (!(length < 1e150)) return face.mean_mm[k];  // also NaN: what was measured is no face
+    return face.mean_mm[k] + (reach / length) * offset;
+}
+
+// Measured where it was measured, inferred elsewhere. A weak prior decides only what was not measured.
+Vec3 with_own_measurement(const StabilisedMarker& marker, const Vec3& inferred_mm) {
+    const double mean = marker.information.trace() / 3.0;
+    const bool full_rank = marker.information.determinant() > kSmallestDepthShare * mean * mean * mean;
+    if (full_rank) return marker.position_mm;
+    const Mat3 system = marker.information + kWeakPrior * mean * Mat3::Identity();
+    const Vec3 offset = marker.information * (marker.position_mm - inferred_mm);
+    return inferred_mm + inverse_3x3(system) * offset;
+}
+
+void put(const FaceGaussian& face, const StabilisedMarker& marker, std::size_t k, const Vec3& estimate_mm,
+         double variance_mm2, InferenceOutput& output) {
+    const Vec3 inferred = within_reach(face, k, estimate_mm);
+    const double usual = face.prior_mm2[k];
+    const double variance = std::clamp(variance_mm2, 0.0, usual);
+    output.position_mm[k] =
+        marker.seen && marker.information.trace() > 0.0 ? with_own_measurement(marker, inferred) : inferred;
+    output.deviation_mm[k] = static_cast<float>(std::sqrt(variance));
+    output.confidence[k] = usual > 0.0 ? static_cast<float>(1.0 - std::sqrt(variance / usual)) : 1.0F;
+}
+
+struct Census {
+    std::size_t hidden = 0;
+    std::size_t partly = 0;
+};
+
+Census classify(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w) {
+    const double nominal = 1.0 / face.noise_mm2;
+    Census census;
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        const StabilisedMarker& marker = stabilised.markers[k];
+        const Knowledge knowledge = knowledge_of(marker, nominal);
+        w.knowledge[k] = static_cast<std::uint8_t>(knowledge);
+        if (knowledge == Knowledge::kHidden) w.hidden[census.hidden++] = static_cast<std::uint16_t>(k);
+        if (knowledge == Knowledge::kPartly) ++census.partly;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const auto at = static_cast<Eigen::Index>(axis);
+            w.error_mm[3 * k + axis] =
+                knowledge == Knowledge::kHidden ? 0.0 : marker.position_mm[at] - face.mean_mm[k][at];
+        }
+    }
+    return census;
+}
+
+void put_by_precision(const FaceGaussian& face, const StabiliserOutput& stabilised, std::size_t hidden,
+                      InferenceWorkspace& w, InferenceOutput& output) {
+    const std::size_t n = 3 * hidden;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double* q = face.precision.data() + hidden_row(w, i) * kMaxRows;
+        w.right[i] = -padded_dot(q, w.error_mm.data(), padded(3U * face.marker_count));
+    }
+    solve_prepared(n, w, w.right.data());
+    for (std::size_t i = 0; i < hidden; ++i) {
+        const std::size_t k = w.hidden[i];
+        const Vec3 offset{w.right[3 * i], w.right[3 * i + 1], w.right[3 * i + 2]};
+        put(face, stabilised.markers[k], k, face.mean_mm[k] + offset, w.variance_mm2[k], output);
+    }
+}
+
+// Mean of x: K M c + r W y.
+void put_by_modes(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w,
+                  InferenceOutput& output) {
+    const std::size_t rows = 3U * face.marker_count;
+    const auto error_of = [&](std::size_t k) {
+        return Vec3{w.error_mm[3 * k], w.error_mm[3 * k + 1], w.error_mm[3 * k + 2]};
+    };
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        const Vec3 weighted = own_weight(face, stabilised, k, w) * error_of(k);
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            w.half[3 * k + axis] = weighted[static_cast<Eigen::Index>(axis)];
+    }
+    combine_rows(face.modes.data(), kMaxModes, w.half.data(), rows, face.mode_count, nullptr, w.right.data());
+    solve_prepared(face.mode_count, w, w.right.data());
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kMeasured) continue;
+        const Mat3 own = face.residual_mm2[k] * own_weight(face, stabilised, k, w);
+        Vec3 predicted;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            predicted[static_cast<Eigen::Index>(axis)] =
+                dot(face.mode_row(3 * k + axis), w.right.data(), face.mode_count);
+        }
+        const Vec3 correction = own * (error_of(k) - predicted);
+        put(face, stabilised.markers[k], k, face.mean_mm[k] + predicted + correction, w.variance_mm2[k],
+            output);
+    }
+}
+
+// What hides where decides all that prepare() works out, unless a marker is partly measured.
+bool is_prepared(const FaceGaussian& face, const Census& census, const InferenceWorkspace& w) {
+    return w.prepared != Prepared::kNothing && census.partly == 0 &&
+           std::equal(w.knowledge.begin(), w.knowledge.begin() + face.marker_count, w.prepared_for.begin());
+}
+
+void prepare(const FaceGaussian& face, const StabiliserOutput& stabilised, const Census& census,
+             InferenceWorkspace& w) {
+    w.prepared = Prepared::kNothing;
+    if (census.partly == 0 && precision_is_cheaper(face, census.hidden) &&
+        prepare_by_precision(face, census.hidden, w)) {
+        w.prepared = Prepared::kPrecision;
+    } else if (prepare_by_modes(face, stabilised, w)) {
+        w.prepared = Prepared::kModes;
+    }
+    w.prepared_for = w.knowledge;
+}
 
 }  // namespace
 
-void infer_missing(const ShapeModel& model, const StabiliserOutput& stabilised, InferenceOutput& output) {
+void reset_inference(InferenceWorkspace& workspace) {
+    workspace.prepared = Prepared::kNothing;
+    workspace.error_mm.fill(0.0);
+}
+
+void infer_missing(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w,
+                   InferenceOutput& output) {
+    RIG_CHECK(stabilised.count == face.marker_count);
     output.count = stabilised.count;
     output.inferred = 0;
-    for (std::size_t k = 0; k < stabilised.count; ++k) {
-        const StabilisedMarker& marker = stabilised.markers[k];
-        const Vec3 inferred = model.face_position(k, stabilised.fit.coefficients);
-        if (!marker.seen) {
-            output.position_mm[k] = inferred;
-            ++output.inferred;
-            continue;
-        }
-        const double mean = marker.information.trace() / 3.0;
-        const bool full_rank = marker.information.determinant() > kSmallestDepthShare * mean * mean * mean;
-        // A weak prior decides only what was not measured.
-        const Mat3 system = marker.information + kWeakPrior * mean * Mat3::Identity();
-        const Vec3 offset = marker.information * (marker.position_mm - inferred);
-        output.position_mm[k] =
-            full_rank ? marker.position_mm : Vec3{inferred + inverse_3x3(system) * offset};
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        if (!stabilised.markers[k].seen) ++output.inferred;
+        output.position_mm[k] = stabilised.markers[k].position_mm;
+        output.confidence[k] = 1.0F;
+        output.deviation_mm[k] = 0.0F;
+    }
+    const Census census = classify(face, stabilised, w);
+    if (census.hidden + census.partly == 0) return;
+    if (!is_prepared(face, census, w)) prepare(face, stabilised, census, w);
+    switch (w.prepared) {
+        case Prepared::kPrecision:
+            put_by_precision(face, stabilised, census.hidden, w, output);
+            return;
+        case Prepared::kModes:
+            put_by_modes(face, stabilised, w, output);
+            return;
+        case Prepared::kNothing:  // not positive definite to working precision: the mean face
+            break;
+    }
+    for (std::size_t k = 0; k < face.marker_count; ++k) {
+        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kMeasured) continue;
+        put(face, stabilised.markers[k], k, face.mean_mm[k], face.prior_mm2[k], output);
     }
 }
 

@@ -255,6 +255,20 @@ std::string_view section_name(SectionType type) {
             return "region shapes";
         case SectionType::kRegionShapeBlend:
             return "shape blend";
+        case SectionType::kMarkerSetNames:
+            return "marker set names";
+        case SectionType::kMarkerSetTable:
+            return "marker set table";
+        case SectionType::kMarkerSetMarkers:
+            return "marker set markers";
+        case SectionType::kMarkerSetMean:
+            return "marker set mean";
+        case SectionType::kMarkerSetModes:
+            return "marker set modes";
+        case SectionType::kMarkerSetVariance:
+            return "marker set variance";
+        case SectionType::kMarkerSetResidual:
+            return "marker set residual";
     }
     return "unknown";
 }

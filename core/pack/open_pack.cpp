@@ -1,6 +1,7 @@
 #include "core/pack/open_pack.hpp"
 
 #include "core/base/math.hpp"
+#include "core/pack/marker_set_sections.hpp"
 #include "core/pack/region_sections.hpp"
 
 namespace rig {
@@ -16,6 +17,7 @@ constexpr double kMinSigma = 1e-6;
 constexpr double kMaxEnergyMm2 = 1e9;
 constexpr double kMaxRbf = 1e6;
 constexpr double kMinWidthMm = 1e-3;
+constexpr double kMinVarianceMm2 = 1e-9;  // of a mode: under any camera's noise
 constexpr double kMaxHullWidths = 1e3;
 constexpr double kOrthonormalTolerance = 1e-3;  // rows stored as float32; a wrong basis misses by far more
 constexpr double kRotationTolerance = 1e-4;     // calibration files print six digits and more
@@ -33,6 +35,7 @@ Bounds bounds_of(SectionType type) {
         case SectionType::kRbfMean:
         case SectionType::kRegionOrigin:
         case SectionType::kRegionExamples:
+        case SectionType::kMarkerSetMean:
             return {-kMaxFaceMm, kMaxFaceMm, PackError::kMagnitude};
         case SectionType::kPriorSigma:
             return {kMinSigma, kMaxWeight, PackError::kPriorSigma};
@@ -40,6 +43,12 @@ Bounds bounds_of(SectionType type) {
             return {0.0, kMaxEnergyMm2, PackError::kTemporalGamma};
         case SectionType::kRbfBasis:
             return {-1.0 - kOrthonormalTolerance, 1.0 + kOrthonormalTolerance, PackError::kRbfBasis};
+        case SectionType::kMarkerSetModes:
+            return {-1.0 - kOrthonormalTolerance, 1.0 + kOrthonormalTolerance, PackError::kMarkerSetModes};
+        case SectionType::kMarkerSetVariance:
+            return {kMinVarianceMm2, kMaxEnergyMm2, PackError::kMarkerSetVariance};
+        case SectionType::kMarkerSetResidual:
+            return {0.0, kMaxEnergyMm2, PackError::kMarkerSetVariance};
         case SectionType::kRbfCentres:
         case SectionType::kRbfWeights:
             return {-kMaxRbf, kMaxRbf, PackError::kMagnitude};
@@ -110,11 +119,13 @@ Result<void, PackError> check_section_set(const PackManifest& manifest) {
     std::array<bool, kSectionTypeCount + 1> present{};
     for (const PackSection& section : manifest.sections)
         present[static_cast<std::size_t>(section.type)] = true;
+    const bool has_sets = present[static_cast<std::size_t>(SectionType::kMarkerSetTable)];
     for (std::size_t i = 1; i <= kSectionTypeCount; ++i) {
         const auto type = static_cast<SectionType>(i);
-        const bool wanted = is_rbf_section(type)      ? manifest.solver == SolverKind::kRbf
-                            : is_region_section(type) ? is_regional(manifest.solver)
-                                                      : true;
+        const bool wanted = is_rbf_section(type)          ? manifest.solver == SolverKind::kRbf
+                            : is_region_section(type)     ? is_regional(manifest.solver)
+                            : is_marker_set_section(type) ? has_sets
+                                                          : true;
         if (wanted && !present[i]) return failure(PackError::kSectionMissing);
         if (!wanted && present[i]) return failure(PackError::kSectionUnexpected);
     }
@@ -130,7 +141,14 @@ Result<void, PackError> check_hashes(ByteSpan bytes, const PackManifest& manifes
     return {};
 }
 
-std::span<const float>* tensor_of(SolvePack& pack, RegionSections& regions, SectionType type) {
+// What is put together once every section is read.
+struct Parts {
+    RegionSections regions;
+    MarkerSetSections sets;
+};
+
+std::span<const float>* tensor_of(SolvePack& pack, Parts& parts, SectionType type) {
+    RegionSections& regions = parts.regions;
     switch (type) {
         case SectionType::kNeutral:
             return &pack.neutral_mm;
@@ -168,36 +186,43 @@ std::span<const float>* tensor_of(SolvePack& pack, RegionSections& regions, Sect
             return &regions.shapes;
         case SectionType::kRegionShapeBlend:
             return &regions.shape_blend;
-        case SectionType::kShapeNames:
-        case SectionType::kMarkerNames:
-        case SectionType::kRegionNames:
-        case SectionType::kRegionTable:
-        case SectionType::kRegionMarkers:
+        case SectionType::kMarkerSetMean:
+            return &parts.sets.mean_mm;
+        case SectionType::kMarkerSetModes:
+            return &parts.sets.modes;
+        case SectionType::kMarkerSetVariance:
+            return &parts.sets.variance_mm2;
+        case SectionType::kMarkerSetResidual:
+            return &parts.sets.residual_mm2;
+        default:  // names, tables and lists of markers are no floats
             break;
     }
     return nullptr;
 }
 
 Result<void, PackError> read_section(ByteSpan part, SectionType type, const PackCounts& counts,
-                                     SolvePack& pack, RegionSections& regions) {
+                                     SolvePack& pack, Parts& parts) {
     if (type == SectionType::kShapeNames)
         return read_names(part, std::span(pack.shape_names).first(pack.shape_count));
     if (type == SectionType::kMarkerNames) {
         return read_names(part, std::span(pack.marker_names).first(pack.marker_count));
     }
     if (type == SectionType::kRegionNames)
-        return read_names(part, std::span(regions.names).first(counts.regions));
-    if (type == SectionType::kRegionTable) return {};  // read first
-    if (type == SectionType::kRegionMarkers) {
-        const auto markers = read_region_markers(part, counts);
+        return read_names(part, std::span(parts.regions.names).first(counts.regions));
+    if (type == SectionType::kMarkerSetNames)
+        return read_names(part, std::span(parts.sets.names).first(counts.marker_sets));
+    if (type == SectionType::kRegionTable || type == SectionType::kMarkerSetTable) return {};  // read first
+    if (type == SectionType::kRegionMarkers || type == SectionType::kMarkerSetMarkers) {
+        const bool regional = type == SectionType::kRegionMarkers;
+        const auto markers = read_marker_list(part, regional ? counts.region_markers : counts.set_markers);
         if (!markers) return failure(markers.error());
-        regions.markers = *markers;
+        (regional ? parts.regions.markers : parts.sets.markers) = *markers;
         return {};
     }
     if (part.size() != sizeof(float) * section_floats(type, counts))
         return failure(PackError::kSectionLength);
     const std::span<const float> values = as_floats(part);
-    *tensor_of(pack, regions, type) = values;
+    *tensor_of(pack, parts, type) = values;
     return check_numbers(type, values);
 }
 
@@ -288,18 +313,22 @@ Result<SolvePack, PackError> open_pack(ByteSpan bytes, HashFunction hash) {
     copy_scalars(*manifest, pack);
     PackCounts counts = manifest->counts;
     for (const PackSection& section : manifest->sections) {
-        if (section.type != SectionType::kRegionTable) continue;
-        auto ok = read_region_table(section_bytes(bytes, section), pack.solver, counts, pack);
+        const ByteSpan part = section_bytes(bytes, section);
+        Result<void, PackError> ok{};
+        if (section.type == SectionType::kRegionTable)
+            ok = read_region_table(part, pack.solver, counts, pack);
+        if (section.type == SectionType::kMarkerSetTable) ok = read_marker_set_table(part, counts, pack);
         if (!ok) return failure(ok.error());
     }
-    RegionSections regions;
+    Parts parts;
     for (const PackSection& section : manifest->sections) {
-        auto ok = read_section(section_bytes(bytes, section), section.type, counts, pack, regions);
+        auto ok = read_section(section_bytes(bytes, section), section.type, counts, pack, parts);
         if (!ok) return failure(ok.error());
     }
     if (auto ok = check_weight_ranges(pack); !ok) return failure(ok.error());
     if (auto ok = check_rbf_basis(pack.rbf, 3 * manifest->counts.markers); !ok) return failure(ok.error());
-    if (auto ok = assemble_regions(regions, pack); !ok) return failure(ok.error());
+    if (auto ok = assemble_regions(parts.regions, pack); !ok) return failure(ok.error());
+    if (auto ok = assemble_marker_sets(parts.sets, pack); !ok) return failure(ok.error());
     return pack;
 }
 

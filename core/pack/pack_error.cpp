@@ -108,6 +108,14 @@ std::string_view pack_error_text(PackError error) {
             return "the padding of a region's examples is not zero or they are not about their origin";
         case PackError::kRegionShapeBlend:
             return "the blend weights of a shape are outside 0 to 1 or do not sum to 1 or 0 over the regions";
+        case PackError::kMarkerSetTable:
+            return "its marker sets are too many, too large, not level by level, or none is the whole face";
+        case PackError::kMarkerSetMarkers:
+            return "the markers of a marker set are not rising indices of the pack's markers";
+        case PackError::kMarkerSetModes:
+            return "the modes of a marker set are not orthonormal";
+        case PackError::kMarkerSetVariance:
+            return "a variance of a marker set is not positive, not falling, or its residual is negative";
         case PackError::kCameraIntrinsics:
             return "a camera's size, focal length, centre or distortion is implausible";
         case PackError::kCameraRotation:

@@ -62,6 +62,10 @@ enum class PackError : std::uint8_t {
     kRegionOrigin,
     kRegionExamples,
     kRegionShapeBlend,
+    kMarkerSetTable,
+    kMarkerSetMarkers,
+    kMarkerSetModes,
+    kMarkerSetVariance,
     kCameraIntrinsics,
     kCameraRotation,
     kCount  // how many there are; never returned

@@ -13,7 +13,7 @@
 // All integers and floats little-endian. Tensors are float32, row-major; lists of markers are u16. Names are
 // UTF-8, each ended by '\n'. The region table is one record of 8 bytes a region: u8 solver, u8 0, u16
 // markers, u16 examples, u16 0; the other region sections hold the regions' parts one after the other in its
-// order.
+// order. The marker set table likewise: u8 level, u8 0, u16 markers, u16 modes, u16 0.
 #pragma once
 
 #include <array>
@@ -29,8 +29,9 @@ namespace rig {
 
 inline constexpr std::array<char, 8> kPackMagic{'R', 'I', 'G', 'P', 'A', 'C', 'K', '1'};
 inline constexpr std::uint32_t kPackFormatVersion = 1;
-inline constexpr std::uint16_t kSolverAbi = 2;  // grows when core reads a pack's numbers differently
-// A pack of this number still means the same: 2 brought the RBF's kernel and its fallback, both off before.
+inline constexpr std::uint16_t kSolverAbi = 3;  // grows when core reads a pack's numbers differently
+// A pack of this number still means the same: 2 brought the RBF's kernel and its fallback, both off before; 3
+// brought marker sets, which older packs lack.
 inline constexpr std::uint16_t kOldestSolverAbi = 1;
 inline constexpr std::size_t kPackHeaderBytes = 64;
 inline constexpr std::size_t kPackAlignment = 64;  // a cache line, and more than any vector load needs
@@ -65,8 +66,15 @@ enum class SectionType : std::uint16_t {
     kRegionExamples = 21,
     kRegionShapes = 22,
     kRegionShapeBlend = 23,
+    kMarkerSetNames = 24,
+    kMarkerSetTable = 25,
+    kMarkerSetMarkers = 26,
+    kMarkerSetMean = 27,
+    kMarkerSetModes = 28,
+    kMarkerSetVariance = 29,
+    kMarkerSetResidual = 30,
 };
-inline constexpr std::size_t kSectionTypeCount = 23;  // types are 1..kSectionTypeCount
+inline constexpr std::size_t kSectionTypeCount = 30;  // types are 1..kSectionTypeCount
 
 // "basis", "rbf centres", ...; "unknown" outside the enumeration.
 [[nodiscard]] std::string_view section_name(SectionType type);
@@ -74,9 +82,14 @@ inline constexpr std::size_t kSectionTypeCount = 23;  // types are 1..kSectionTy
     return type >= SectionType::kRbfMean && type <= SectionType::kRbfOffset;
 }
 [[nodiscard]] constexpr bool is_region_section(SectionType type) {
-    return type >= SectionType::kRegionNames;
+    return type >= SectionType::kRegionNames && type <= SectionType::kRegionShapeBlend;
+}
+// All of them or none, with any solver.
+[[nodiscard]] constexpr bool is_marker_set_section(SectionType type) {
+    return type >= SectionType::kMarkerSetNames && type <= SectionType::kMarkerSetResidual;
 }
 inline constexpr std::size_t kRegionRecordBytes = 8;
+inline constexpr std::size_t kMarkerSetRecordBytes = 8;
 
 [[nodiscard]] constexpr std::uint64_t align_up(std::uint64_t offset) {
     return (offset + (kPackAlignment - 1)) / kPackAlignment * kPackAlignment;
@@ -93,6 +106,11 @@ struct PackCounts {
     std::size_t region_markers = 0;         // m_r
     std::size_t region_examples = 0;        // n_r
     std::size_t region_example_floats = 0;  // 3 m_r padded(n_r)
+    // Of the marker set table; read with it.
+    std::size_t marker_sets = 0;
+    std::size_t set_markers = 0;      // sum of m_f
+    std::size_t set_modes = 0;        // sum of k
+    std::size_t set_mode_floats = 0;  // sum of k 3 m_f
 };
 [[nodiscard]] constexpr std::size_t section_floats(SectionType type, const PackCounts& n) {
     switch (type) {
@@ -126,11 +144,22 @@ struct PackCounts {
             return n.region_examples * n.shapes;
         case SectionType::kRegionShapeBlend:
             return n.regions * n.shapes;
+        case SectionType::kMarkerSetMean:
+            return 3 * n.set_markers;
+        case SectionType::kMarkerSetModes:
+            return n.set_mode_floats;
+        case SectionType::kMarkerSetVariance:
+            return n.set_modes;
+        case SectionType::kMarkerSetResidual:
+            return n.set_markers;
         case SectionType::kShapeNames:
         case SectionType::kMarkerNames:
         case SectionType::kRegionNames:
         case SectionType::kRegionTable:
         case SectionType::kRegionMarkers:
+        case SectionType::kMarkerSetNames:
+        case SectionType::kMarkerSetTable:
+        case SectionType::kMarkerSetMarkers:
             break;
     }
     return 0;

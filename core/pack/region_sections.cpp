@@ -108,12 +108,10 @@ Result<void, PackError> read_region_table(ByteSpan table, SolverKind solver, Pac
     return has_own ? Result<void, PackError>{} : failure(PackError::kRegionTable);
 }
 
-Result<std::span<const std::uint16_t>, PackError> read_region_markers(ByteSpan part,
-                                                                      const PackCounts& counts) {
-    if (part.size() != sizeof(std::uint16_t) * counts.region_markers)
-        return failure(PackError::kSectionLength);
+Result<std::span<const std::uint16_t>, PackError> read_marker_list(ByteSpan part, std::size_t count) {
+    if (part.size() != sizeof(std::uint16_t) * count) return failure(PackError::kSectionLength);
     // Aligned, as every section is.
-    return std::span(reinterpret_cast<const std::uint16_t*>(part.data()), counts.region_markers);
+    return std::span(reinterpret_cast<const std::uint16_t*>(part.data()), count);
 }
 
 Result<void, PackError> assemble_regions(const RegionSections& sections, SolvePack& pack) {

@@ -30,9 +30,9 @@ struct RegionSections {
 [[nodiscard]] Result<void, PackError> read_region_table(ByteSpan table, SolverKind solver, PackCounts& counts,
                                                         SolvePack& pack);
 
-// [region_markers] indices; kSectionLength.
-[[nodiscard]] Result<std::span<const std::uint16_t>, PackError> read_region_markers(ByteSpan part,
-                                                                                    const PackCounts& counts);
+// `count` indices; kSectionLength.
+[[nodiscard]] Result<std::span<const std::uint16_t>, PackError> read_marker_list(ByteSpan part,
+                                                                                 std::size_t count);
 
 // Hands every region its part and checks what belongs together: markers rising and inside the pack, blends
 // that sum to 1, origins as the solvers need them, zero padding. Lengths fit the counts already.

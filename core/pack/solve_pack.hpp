@@ -76,6 +76,23 @@ struct RegionModel {
     std::span<const float> shape_blend;  // [N] 0..1; sums to 1 over the regions, or to 0 for a shape of none
 };
 
+// How a set of markers moves together: a point of a face is neutral + d with
+//   d = mean + modes c,   c_j ~ N(0, variance_j),
+// and each coordinate strays from that by residual^2. Sets overlap and lie on levels, 0 the whole face, then
+// ever smaller parts  [Zhang06 section 10].
+struct MarkerSetModel {
+    std::string_view name;
+    std::uint8_t level = 0;                  // 0..kDeepestMarkerSetLevel
+    std::uint16_t marker_count = 0;          // m_f, 1..m
+    std::uint16_t mode_count = 0;            // k, 1..kMaxModes, at most 3 m_f
+    std::span<const std::uint16_t> markers;  // [m_f] rising
+    std::span<const float> mean_mm;          // [3 m_f] displacement from neutral
+    std::span<const float> modes;            // [k x 3 m_f] row-major, orthonormal rows
+    std::span<const float> variance_mm2;     // [k] > 0, falling
+    std::span<const float> residual_mm2;     // [m_f] >= 0, of one coordinate of the marker
+};
+inline constexpr std::uint8_t kDeepestMarkerSetLevel = 2;
+
 // Column i of the basis is (shape i - neutral) at the markers; rows x0, y0, z0, x1, ... of marker k at 3k.
 // Frames: face frame of the rig, mm: +x performer's left, +y up, +z out of the face, origin between the
 // eyeballs.
@@ -99,6 +116,10 @@ struct SolvePack {
     RbfModel rbf;                   // empty unless solver == kRbf
     std::uint8_t region_count = 0;  // 0 unless is_regional(solver)
     std::array<RegionModel, kMaxRegions> regions{};
+    // 0 in packs that were trained without; then the rig's shapes and priors say how unseen markers move.
+    // Levels rise; the first set is the only one on level 0 and holds every marker.
+    std::uint8_t marker_set_count = 0;
+    std::array<MarkerSetModel, kMaxMarkerSets> marker_sets{};
 
     std::uint8_t camera_count = 0;  // 0 for packs that only solve marker streams
     std::array<CameraModel, kMaxCameras> cameras{};

@@ -78,6 +78,10 @@ struct FrameReport {
         labels{};  // PointFrame input: the marker each point was taken for, -1 none
     // stabilised, completed markers in the face frame, mm; [marker_count]
     std::array<Vec3, kMaxMarkers> face_markers_mm{};
+    // 1 measured .. 0 unknown, and the expected distance from the truth of those inferred;
+    // completed_markers.hpp
+    std::array<float, kMaxMarkers> marker_confidence{};
+    std::array<float, kMaxMarkers> marker_deviation_mm{};
 };
 
 }  // namespace rig

@@ -52,6 +52,8 @@ Result<void, PipelineError> Pipeline::configure(const SolvePack& pack, const Pip
     pack_ = pack;
     build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, model_workspace_,
                       model_);
+    build_face_gaussian(pack, model_, face_gaussian_workspace_, face_gaussian_);
+    reset_inference(inference_workspace_);
     configure_solver(pack, config.rate_hz, solver_workspace_, solver_config_);
     configure_stages(config);
     for (std::size_t i = 0; i < pack.shape_count; ++i) sent_[i] = rest(pack, i);
@@ -231,7 +233,7 @@ void Pipeline::idle(std::int64_t now_us, FaceState& state, FrameReport& report) 
 void Pipeline::solve_named(std::int64_t capture_us, FrameReport& report) {
     stabilise(model_, stabiliser_config_, named_, stabiliser_, stabiliser_workspace_, stabilised_,
               stabiliser_report_);
-    infer_missing(model_, stabilised_, completed_);
+    infer_missing(face_gaussian_, stabilised_, inference_workspace_, completed_);
     solve(solver_config_, stabilised_, completed_, capture_us, solver_, solver_workspace_, solved_,
           solver_report_);
     control_output(solver_config_.controls, {solved_.weights.data(), pack_.shape_count});
@@ -244,8 +246,11 @@ void Pipeline::solve_named(std::int64_t capture_us, FrameReport& report) {
     report.residual_rms_mm = solver_report_.residual_rms_mm;
     report.hull_distance = solver_report_.hull_distance;
     report.optimal = solver_report_.optimal;
-    for (std::size_t k = 0; k < pack_.marker_count; ++k)
+    for (std::size_t k = 0; k < pack_.marker_count; ++k) {
         report.face_markers_mm[k] = completed_.position_mm[k];
+        report.marker_confidence[k] = completed_.confidence[k];
+        report.marker_deviation_mm[k] = completed_.deviation_mm[k];
+    }
 }
 
 bool Pipeline::is_partial(const FaceState& state) const {

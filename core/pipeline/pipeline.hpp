@@ -22,7 +22,7 @@ namespace rig {
 // kFilter: a window, a kind of filter or the delay is outside its range.
 enum class PipelineError : std::uint8_t { kPackLimits, kRate, kFilter };
 
-// About 11 MB, all of it inside the object: a program places it before seal(), never on a stack. step() and
+// About 19 MB, all of it inside the object: a program places it before seal(), never on a stack. step() and
 // idle() never allocate. The pack's bytes outlive it. One thread uses a pipeline.
 class Pipeline {
   public:
@@ -96,6 +96,9 @@ class Pipeline {
     StabiliserOutput stabilised_;
     StabiliserReport stabiliser_report_;
 
+    FaceGaussian face_gaussian_;
+    FaceGaussianWorkspace face_gaussian_workspace_;
+    InferenceWorkspace inference_workspace_;
     InferenceOutput completed_;
 
     SolverConfig solver_config_;

@@ -139,7 +139,7 @@ json pack_json(const OpenedPack& opened) {
                 {"rbf_centres", pack.rbf.centre_count},
                 {"rbf_kernel", rbf_kernel_name(pack.rbf.kernel)},
                 {"rbf_hull_widths", {pack.rbf.hull_near_widths, pack.rbf.hull_far_widths}}};
-    for (const char* list : {"boards", "sections", "cameras", "regions", "shapes", "markers"})
+    for (const char* list : {"boards", "sections", "cameras", "regions", "marker_sets", "shapes", "markers"})
         out[list] = json::array();
     for (const std::string_view board : manifest.boards) out["boards"].push_back(board);
     for (const PackSection& section : manifest.sections) {
@@ -152,6 +152,13 @@ json pack_json(const OpenedPack& opened) {
         out["cameras"].push_back(camera_json(pack.cameras[c]));
     for (std::size_t r = 0; r < pack.region_count; ++r)
         out["regions"].push_back(region_json(pack, pack.regions[r]));
+    for (std::size_t f = 0; f < pack.marker_set_count; ++f) {
+        const MarkerSetModel& set = pack.marker_sets[f];
+        out["marker_sets"].push_back({{"name", set.name},
+                                      {"level", set.level},
+                                      {"markers", set.marker_count},
+                                      {"components", set.mode_count}});
+    }
     for (std::size_t i = 0; i < pack.shape_count; ++i) out["shapes"].push_back(shape_json(pack, i));
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         out["markers"].push_back(
@@ -188,6 +195,7 @@ void print_identity(const PackInfoCommand& command, const OpenedPack& opened) {
         }
     }
     if (pack.region_count > 0) fmt::print("regions      {}\n", pack.region_count);
+    if (pack.marker_set_count > 0) fmt::print("marker sets  {}\n", pack.marker_set_count);
     fmt::print("cameras      {}\n", pack.camera_count);
 }
 
@@ -210,12 +218,17 @@ void print_tables(const OpenedPack& opened) {
         fmt::print("  {:<14} {:<8} {:>3} markers {:>3} examples  speaks for {} shapes\n", region.name,
                    region_solver_name(region.solver), region.marker_count, region.example_count, shapes);
     }
-    fmt::print("\n{:<16} {:>9} {:>9}  sha256\n", "section", "offset", "bytes");
+    for (std::size_t f = 0; f < pack.marker_set_count; ++f) {
+        const MarkerSetModel& set = pack.marker_sets[f];
+        fmt::print("  {:<18} level {}  {:>3} markers {:>3} components\n", set.name, set.level,
+                   set.marker_count, set.mode_count);
+    }
+    fmt::print("\n{:<19} {:>9} {:>9}  sha256\n", "section", "offset", "bytes");
     for (const PackSection& section : manifest.sections) {
-        fmt::print("{:<16} {:>9} {:>9}  {}\n", section_name(section.type), section.offset, section.length,
+        fmt::print("{:<19} {:>9} {:>9}  {}\n", section_name(section.type), section.offset, section.length,
                    hex(section.hash));
     }
-    fmt::print("{:<16} {:>9} {:>9}  {}\n", "manifest", kPackHeaderBytes, manifest.manifest_bytes,
+    fmt::print("{:<19} {:>9} {:>9}  {}\n", "manifest", kPackHeaderBytes, manifest.manifest_bytes,
                hex(manifest.manifest_hash));
     fmt::print("\n{:<28} {:>9} {:>5} {:>5} {:>7} {:>7} {:>10}\n", "shape", "column mm", "low", "high", "mean",
                "sigma", "pull mm^2");

@@ -73,6 +73,10 @@ void print_result(const TrainCommand& command, const TrainedPack& pack) {
         fmt::print("region {}: {} markers, {} examples\n", region.name, region.markers.size(),
                    region.example_count);
     }
+    if (!pack.marker_sets.empty()) {
+        fmt::print("marker sets: {}, the whole face with {} components\n", pack.marker_sets.size(),
+                   pack.marker_sets[0].mode_count);
+    }
     if (!pack.report.rbf) return;
     const RbfTrainingReport& rbf = *pack.report.rbf;
     fmt::print(
@@ -128,6 +132,8 @@ Result<void, FileError> write_reports(const TrainCommand& command, const Trained
     return write_whole_text(command.report, pack_page(input));
 }
 
+constexpr std::size_t kUsualComponents = 5;  // of a marker set, at least  [Zhang06 section 14]
+
 void print_warnings(const TrainedPack& pack) {
     const std::size_t shapes = pack.shape_names.size();
     if (pack.report.rank < shapes) {
@@ -135,6 +141,13 @@ void print_warnings(const TrainedPack& pack) {
             "warning: the layout tells only {} of {} shapes apart (rank of B); a layout with more "
             "markers tells more",
             pack.report.rank, shapes));
+    }
+    for (const TrainedMarkerSet& set : pack.marker_sets) {
+        if (set.mode_count >= kUsualComponents) continue;
+        print_error(
+            fmt::format("warning: the expressions move marker set {} in {} ways only; the source keeps {} "
+                        "components or more",
+                        set.name, set.mode_count, kUsualComponents));
     }
     if (pack.report.invisible.empty()) return;
     std::string list;
@@ -319,6 +332,17 @@ void add_rbf_options(CLI::App& verb, TrainCommand& command) {
         ->type_name("NEAR,FAR");
 }
 
+void add_pack_options(CLI::App& verb, TrainCommand& command) {
+    verb.add_flag("!--no-marker-sets", command.options.marker_sets,
+                  "leave out how unseen markers move with seen ones: a pack for older rigs");
+    verb.add_option("--report", command.report, "HTML page about the pack and its training")
+        ->type_name("HTML");
+    verb.add_option("--name", command.name, "name inside the pack [the file's]")->type_name("NAME");
+    verb.add_option("--pack-version", command.identity.pack_version, "version inside the pack")
+        ->capture_default_str();
+    verb.add_option("--out", command.out, "pack file to write")->required()->type_name("PACK");
+}
+
 }  // namespace
 
 void add_train_verb(CLI::App& app, int& exit_code) {
@@ -372,12 +396,7 @@ void add_train_verb(CLI::App& app, int& exit_code) {
                      "examples of the face, the neutral one among them")
         ->capture_default_str()
         ->type_name("K");
-    verb->add_option("--report", command->report, "HTML page about the pack and its training")
-        ->type_name("HTML");
-    verb->add_option("--name", command->name, "name inside the pack [the file's]")->type_name("NAME");
-    verb->add_option("--pack-version", command->identity.pack_version, "version inside the pack")
-        ->capture_default_str();
-    verb->add_option("--out", command->out, "pack file to write")->required()->type_name("PACK");
+    add_pack_options(*verb, *command);
     verb->footer(
         "Examples:\n  headrig train --rig sample --layout 60 --solver boxqp --cameras cameras.json --out "
         "face.pack\n"

@@ -49,8 +49,12 @@ struct Experiment {
 [[nodiscard]] Result<ExperimentTable, FileError> deng06_proportions(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> deng06_variance(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> hybrid16_barycentric(const std::filesystem::path& data);
+// `data` may be "sample": the built-in head and its take.
+[[nodiscard]] Result<ExperimentTable, FileError> missing_markers(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> rbf_dimensions(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> temporal_prior(const std::filesystem::path& data);
+[[nodiscard]] Result<ExperimentTable, FileError> zhang06_motion_model(const std::filesystem::path& data);
+[[nodiscard]] Result<ExperimentTable, FileError> zhang06_propagation(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> zhang06_regions(const std::filesystem::path& data);
 
 }  // namespace rig::host

@@ -22,6 +22,9 @@ struct Stages {
     StabiliserWorkspace stabiliser_workspace;
     StabiliserOutput stabilised;
     StabiliserReport stabiliser_report;
+    FaceGaussian face_gaussian;
+    FaceGaussianWorkspace face_gaussian_workspace;
+    InferenceWorkspace inference_workspace;
     InferenceOutput completed;
     SolverConfig solver_config;
     SolverState solver;
@@ -51,6 +54,7 @@ SolvedTake solve_take(const SolvePack& pack, const MarkerTake& take, bool stabil
     const auto stages = std::make_unique<Stages>();
     build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma,
                       stages->model_workspace, stages->model);
+    build_face_gaussian(pack, stages->model, stages->face_gaussian_workspace, stages->face_gaussian);
     configure_solver(pack, take.rate_hz, stages->solver_workspace, stages->solver_config);
     stages->stabiliser_config.enabled = stabilised;
     const auto shapes = static_cast<Eigen::Index>(pack.shape_count);
@@ -62,7 +66,8 @@ SolvedTake solve_take(const SolvePack& pack, const MarkerTake& take, bool stabil
         name_markers(take, f, static_cast<double>(pack.noise_mm), capture_us, stages->named);
         stabilise(stages->model, stages->stabiliser_config, stages->named, stages->stabiliser,
                   stages->stabiliser_workspace, stages->stabilised, stages->stabiliser_report);
-        infer_missing(stages->model, stages->stabilised, stages->completed);
+        infer_missing(stages->face_gaussian, stages->stabilised, stages->inference_workspace,
+                      stages->completed);
         solve(stages->solver_config, stages->stabilised, stages->completed, capture_us, stages->solver,
               stages->solver_workspace, stages->output, stages->report);
         out.headset_from_face.push_back(stages->stabilised.headset_from_face);

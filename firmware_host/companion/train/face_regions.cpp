@@ -40,21 +40,6 @@ constexpr std::array<Anchor, 14> kAnchors{{{"forehead", 0.0, 0.45},
                                            {"left_jaw", 0.65, -0.75},
                                            {"right_jaw", -0.65, -0.75}}};
 
-struct Extent {
-    double half_width_mm = 1.0;
-    double depth_mm = 1.0;  // of the lowest marker below the eyes
-};
-
-Extent extent_of(const MarkerLayout& layout) {
-    Extent extent;
-    for (const LayoutMarker& marker : layout.markers) {
-        extent.half_width_mm =
-            std::max(extent.half_width_mm, std::fabs(static_cast<double>(marker.neutral_mm[0])));
-        extent.depth_mm = std::max(extent.depth_mm, -static_cast<double>(marker.neutral_mm[1]));
-    }
-    return extent;
-}
-
 bool is_pupil(const LayoutMarker& marker) {
     std::string name = marker.name;
     for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -72,7 +57,7 @@ void drop_empty(std::vector<MarkerRegion>& regions) {
 }
 
 std::vector<double> distances_mm(const LayoutMarker& marker, const std::vector<Anchor>& anchors,
-                                 const Extent& extent) {
+                                 const LayoutExtent& extent) {
     std::vector<double> out;
     for (const Anchor& anchor : anchors) {
         const double x = static_cast<double>(marker.neutral_mm[0]) - anchor.across * extent.half_width_mm;
@@ -83,7 +68,7 @@ std::vector<double> distances_mm(const LayoutMarker& marker, const std::vector<A
 }
 
 // Takes out the anchor that owns the fewest markers, while one owns too few.
-std::vector<Anchor> anchors_with_markers(const MarkerLayout& layout, const Extent& extent) {
+std::vector<Anchor> anchors_with_markers(const MarkerLayout& layout, const LayoutExtent& extent) {
     std::vector<Anchor> anchors(kAnchors.begin(), kAnchors.end());
     while (anchors.size() > 1) {
         std::vector<std::size_t> owned(anchors.size(), 0);
@@ -100,8 +85,18 @@ std::vector<Anchor> anchors_with_markers(const MarkerLayout& layout, const Exten
 
 }  // namespace
 
+LayoutExtent extent_of(const MarkerLayout& layout) {
+    LayoutExtent extent;
+    for (const LayoutMarker& marker : layout.markers) {
+        extent.half_width_mm =
+            std::max(extent.half_width_mm, std::fabs(static_cast<double>(marker.neutral_mm[0])));
+        extent.depth_mm = std::max(extent.depth_mm, -static_cast<double>(marker.neutral_mm[1]));
+    }
+    return extent;
+}
+
 std::vector<MarkerRegion> feature_regions(const MarkerLayout& layout) {
-    const Extent extent = extent_of(layout);
+    const LayoutExtent extent = extent_of(layout);
     std::vector<MarkerRegion> regions(3);
     regions[0].name = "eyes";
     regions[1].name = "mouth";
@@ -122,7 +117,7 @@ std::vector<MarkerRegion> feature_regions(const MarkerLayout& layout) {
 }
 
 std::vector<MarkerRegion> surface_regions(const MarkerLayout& layout) {
-    const Extent extent = extent_of(layout);
+    const LayoutExtent extent = extent_of(layout);
     const std::vector<Anchor> anchors = anchors_with_markers(layout, extent);
     std::vector<MarkerRegion> regions(anchors.size());
     for (std::size_t a = 0; a < anchors.size(); ++a) regions[a].name = anchors[a].name;

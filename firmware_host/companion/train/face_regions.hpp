@@ -11,6 +11,13 @@
 
 namespace rig::host {
 
+// How large a layout is, about the eyes.
+struct LayoutExtent {
+    double half_width_mm = 1.0;  // of the widest marker from the middle
+    double depth_mm = 1.0;       // of the lowest marker below the eyes
+};
+[[nodiscard]] LayoutExtent extent_of(const MarkerLayout& layout);
+
 // A marker may belong to several regions; its blends sum to 1.
 struct MarkerRegion {
     std::string name;

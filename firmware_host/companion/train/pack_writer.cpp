@@ -39,20 +39,33 @@ std::vector<std::byte> bytes_of(std::span<const std::string_view> names) {
     return bytes;
 }
 
-template <class T>
-std::vector<std::byte> joined(std::span<const RegionModel> regions, std::span<const T> RegionModel::* part) {
+// One part of every model, one after the other.
+template <class Model, class T>
+std::vector<std::byte> joined(std::span<const Model> models, std::span<const T> Model::* part) {
     std::vector<std::byte> bytes;
-    for (const RegionModel& region : regions) {
-        const auto raw = std::as_bytes(region.*part);
+    for (const Model& model : models) {
+        const auto raw = std::as_bytes(model.*part);
         bytes.insert(bytes.end(), raw.begin(), raw.end());
     }
     return bytes;
 }
 
-std::vector<std::byte> bytes_of_names(std::span<const RegionModel> regions) {
+template <class Model>
+std::vector<std::byte> bytes_of_names(std::span<const Model> models) {
     std::vector<std::string_view> names;
-    for (const RegionModel& region : regions) names.push_back(region.name);
+    for (const Model& model : models) names.push_back(model.name);
     return bytes_of(names);
+}
+
+std::vector<std::byte> bytes_of_table(std::span<const MarkerSetModel> sets) {
+    std::vector<std::byte> bytes(kMarkerSetRecordBytes * sets.size());
+    for (std::size_t f = 0; f < sets.size(); ++f) {
+        const MutableByteSpan record = MutableByteSpan(bytes).subspan(f * kMarkerSetRecordBytes);
+        store(record, 0, sets[f].level);
+        store(record, 2, sets[f].marker_count);
+        store(record, 4, sets[f].mode_count);
+    }
+    return bytes;
 }
 
 std::vector<std::byte> bytes_of_table(std::span<const RegionModel> regions) {
@@ -94,7 +107,7 @@ std::vector<SectionData> sections_of(const SolvePack& pack, HashFunction hash) {
         add(SectionType::kRbfOffset, bytes_of(pack.rbf.offset));
     }
     if (is_regional(pack.solver)) {
-        const std::span regions =
+        const std::span<const RegionModel> regions =
             std::span(pack.regions).first(std::min<std::size_t>(pack.region_count, kMaxRegions));
         add(SectionType::kRegionNames, bytes_of_names(regions));
         add(SectionType::kRegionTable, bytes_of_table(regions));
@@ -104,6 +117,17 @@ std::vector<SectionData> sections_of(const SolvePack& pack, HashFunction hash) {
         add(SectionType::kRegionExamples, joined(regions, &RegionModel::examples_mm));
         add(SectionType::kRegionShapes, joined(regions, &RegionModel::shapes));
         add(SectionType::kRegionShapeBlend, joined(regions, &RegionModel::shape_blend));
+    }
+    if (pack.marker_set_count > 0) {
+        const std::span<const MarkerSetModel> sets =
+            std::span(pack.marker_sets).first(std::min<std::size_t>(pack.marker_set_count, kMaxMarkerSets));
+        add(SectionType::kMarkerSetNames, bytes_of_names(sets));
+        add(SectionType::kMarkerSetTable, bytes_of_table(sets));
+        add(SectionType::kMarkerSetMarkers, joined(sets, &MarkerSetModel::markers));
+        add(SectionType::kMarkerSetMean, joined(sets, &MarkerSetModel::mean_mm));
+        add(SectionType::kMarkerSetModes, joined(sets, &MarkerSetModel::modes));
+        add(SectionType::kMarkerSetVariance, joined(sets, &MarkerSetModel::variance_mm2));
+        add(SectionType::kMarkerSetResidual, joined(sets, &MarkerSetModel::residual_mm2));
     }
     return out;
 }
@@ -159,6 +183,16 @@ std::vector<fb::Section> table_of(const std::vector<SectionData>& sections, std:
     return table;
 }
 
+// An older core refuses marker sets; a still older one would take any kernel for the Gaussian and never fall
+// back.
+std::uint16_t oldest_core_for(const SolvePack& pack) {
+    constexpr std::uint16_t kMarkerSetAbi = 3;
+    constexpr std::uint16_t kRbfKernelAbi = 2;
+    if (pack.marker_set_count > 0) return kMarkerSetAbi;
+    const bool gaussian = pack.rbf.kernel == RbfKernel::kGaussian && pack.rbf.hull_far_widths == 0.0F;
+    return gaussian ? kOldestSolverAbi : kRbfKernelAbi;
+}
+
 std::vector<std::byte> manifest_of(const SolvePack& pack, const PackIdentity& identity,
                                    const std::vector<SectionData>& sections, std::uint64_t manifest_bytes) {
     const std::vector<fb::Section> table = table_of(sections, manifest_bytes);
@@ -178,10 +212,7 @@ std::vector<std::byte> manifest_of(const SolvePack& pack, const PackIdentity& id
     manifest.add_name(name);
     manifest.add_pack_version(identity.pack_version);
     manifest.add_security_counter(identity.security_counter);
-    // An older core would take any kernel for the Gaussian and never fall back.
-    const bool older_core_agrees =
-        pack.rbf.kernel == RbfKernel::kGaussian && pack.rbf.hull_far_widths == 0.0F;
-    manifest.add_solver_abi_min(older_core_agrees ? kOldestSolverAbi : kSolverAbi);
+    manifest.add_solver_abi_min(oldest_core_for(pack));
     manifest.add_solver_abi_max(kSolverAbi);
     manifest.add_boards(boards);
     manifest.add_memory_bytes((total + 4095) / 4096 * 4096);  // whole pages of the mapped file

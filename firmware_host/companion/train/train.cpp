@@ -145,6 +145,8 @@ SolvePack TrainedPack::view() const {
     out.rbf = view_of(rbf);
     out.region_count = static_cast<std::uint8_t>(std::min(regions.size(), kMaxRegions));
     for (std::size_t r = 0; r < out.region_count; ++r) out.regions[r] = regions[r].view();
+    out.marker_set_count = static_cast<std::uint8_t>(std::min(marker_sets.size(), kMaxMarkerSets));
+    for (std::size_t f = 0; f < out.marker_set_count; ++f) out.marker_sets[f] = marker_sets[f].view();
     out.camera_count = static_cast<std::uint8_t>(cameras.size());
     std::ranges::copy(cameras, out.cameras.begin());
     std::ranges::copy(shape_names, out.shape_names.begin());
@@ -170,6 +172,10 @@ Result<TrainedPack, FileError> train(const Rig& rig, const MarkerLayout& layout,
     pack.basis_mm = std::move(model.basis_mm);
     fill_priors(options, pack);
     describe_basis(pack);
+    if (options.marker_sets) {
+        pack.marker_sets = train_marker_sets(marker_sets(layout), pack.basis_mm,
+                                             spread_of_takes(options.takes, pack.shape_names.size()));
+    }
     if (options.solver == SolverKind::kRbf) {
         auto trained =
             train_rbf(pack.neutral_mm, pack.basis_mm, options.takes, options.noise_mm, options.rbf, progress);

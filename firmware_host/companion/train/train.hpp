@@ -12,6 +12,7 @@
 #include "firmware_host/companion/files/file_error.hpp"
 #include "firmware_host/companion/rig_folder/rig_folder.hpp"
 #include "firmware_host/companion/train/coverage.hpp"
+#include "firmware_host/companion/train/marker_set_training.hpp"
 #include "firmware_host/companion/train/rbf_training.hpp"
 #include "firmware_host/companion/train/regional_training.hpp"
 
@@ -40,6 +41,7 @@ struct TrainOptions {
     std::optional<double> ridge;
     RbfTrainingOptions rbf;
     RegionalTrainingOptions regional;
+    bool marker_sets = true;  // how unseen markers move with seen ones; false: a pack for older rigs
 };
 
 inline constexpr double kDefaultSparsity = 0.01;
@@ -82,6 +84,7 @@ class TrainedPack {
     std::vector<CameraModel> cameras;
     TrainedRbf rbf;
     std::vector<TrainedRegion> regions;
+    std::vector<TrainedMarkerSet> marker_sets;
     TrainReport report;
 };
 

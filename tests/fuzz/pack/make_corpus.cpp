@@ -37,6 +37,7 @@ int main(int argc, char** argv) {
         save(folder / "rbf", {.solver = kRbf}, {.name = "rbf", .boards = {"sim"}}) &&
         save(folder / "key_shapes", {.solver = kKeyShapes}, {}) &&
         save(folder / "examples", {.markers = 5, .shapes = 3, .solver = kExamples, .cameras = 0}, {}) &&
+        save(folder / "marker_sets", {.cameras = 0, .marker_sets = true}, {}) &&
         save(folder / "four_cameras", {.markers = 5, .shapes = 1, .solver = kLeastSquares, .cameras = 4}, {});
     return ok ? 0 : 4;
 }

@@ -66,6 +66,7 @@ SamplePack::SamplePack(const SamplePackSize& size) {
         camera.centre_mm = Vec3(10.0 * static_cast<double>(c), -40.0, 200.0);
     }
     if (is_regional(size.solver)) add_regions(size);
+    if (size.marker_sets) add_marker_sets(size);
     if (size.solver != SolverKind::kRbf) return;
     RbfModel& rbf = view.rbf;
     rbf.dimension_count = size.rbf_dimensions;
@@ -133,6 +134,42 @@ void SamplePack::add_regions(const SamplePackSize& size) {
         model.shape_blend = region.shape_blend;
     }
     view.region_count = 2;
+}
+
+void SamplePack::add_marker_sets(const SamplePackSize& size) {
+    Numbers numbers;
+    constexpr const char* kNames[] = {"face", "most", "two"};
+    sets.resize(3);
+    for (std::uint16_t k = 0; k < size.markers; ++k) {
+        sets[0].markers.push_back(k);
+        if (k + 1 < size.markers) sets[1].markers.push_back(k);
+        if (k < 2) sets[2].markers.push_back(k);
+    }
+    for (std::size_t f = 0; f < sets.size(); ++f) {
+        Set& set = sets[f];
+        const std::size_t rows = 3 * set.markers.size();
+        const std::size_t modes = 4 - f;
+        set.mean = numbers.many(rows, 2.0F);
+        set.modes.assign(modes * rows, 0.0F);
+        for (std::size_t j = 0; j < modes; ++j) {
+            // Unit vectors, each in a plane of two coordinates of its own.
+            set.modes[j * rows + j] = 0.6F;
+            set.modes[j * rows + rows - 1 - j] = 0.8F;
+            set.variance.push_back(8.0F / static_cast<float>(j + 1));
+        }
+        set.residual = numbers.many(set.markers.size(), 0.01F, 0.02F);
+        MarkerSetModel& model = view.marker_sets[f];
+        model.name = kNames[f];
+        model.level = static_cast<std::uint8_t>(f);
+        model.marker_count = static_cast<std::uint16_t>(set.markers.size());
+        model.mode_count = static_cast<std::uint16_t>(modes);
+        model.markers = set.markers;
+        model.mean_mm = set.mean;
+        model.modes = set.modes;
+        model.variance_mm2 = set.variance;
+        model.residual_mm2 = set.residual;
+    }
+    view.marker_set_count = 3;
 }
 
 }  // namespace rig::test

@@ -16,6 +16,7 @@ struct SamplePackSize {
     std::uint16_t rbf_centres = 3;
     std::uint8_t cameras = 1;
     std::uint16_t region_examples = 3;  // of the first region; the second has 2
+    bool marker_sets = false;           // three: the whole face, all but the last marker, the first two
 };
 
 // Owns the numbers; `view` points into them, so the object does not move.
@@ -37,8 +38,15 @@ class SamplePack {
     };
     std::vector<Region> regions;
 
+    struct Set {
+        std::vector<std::uint16_t> markers;
+        std::vector<float> mean, modes, variance, residual;
+    };
+    std::vector<Set> sets;
+
   private:
     void add_regions(const SamplePackSize& size);
+    void add_marker_sets(const SamplePackSize& size);
 };
 
 }  // namespace rig::test

@@ -135,6 +135,50 @@ TEST(Dense, SymmetricInverseMatchesColumnSolves) {
     }
 }
 
+TEST(Dense, InverseOfFactorTimesTheFactorIsOne) {
+    test::SeededRandom random(61);
+    for (const std::size_t n : {1U, 2U, 7U, 16U, 17U, 33U, 54U, 96U}) {
+        const std::size_t stride = n + kLaneFloats + 3;
+        const Matrix gram = positive_definite(n, stride, 0.5, random);
+        Matrix a(n * stride, 3.0);
+        for (std::size_t i = 0; i < n; ++i) {
+            for (std::size_t j = 0; j <= i; ++j) a[j * stride + i] = gram[i * stride + j];
+        }
+        Matrix inverse(n * stride, 7.0);
+        std::vector<double> scratch(n);
+        ASSERT_TRUE(inverse_of_factor(a.data(), n, stride, inverse.data(), scratch.data()));
+        // L^-1 A L^-T = I
+        for (std::size_t i = 0; i < n; ++i) {
+            for (std::size_t j = 0; j < n; ++j) {
+                long double sum = 0.0L;
+                for (std::size_t k = 0; k < n; ++k) {
+                    long double row = 0.0L;
+                    for (std::size_t l = 0; l < n; ++l) {
+                        const double g = k >= l ? gram[k * stride + l] : gram[l * stride + k];
+                        row +=
+                            static_cast<long double>(g) * static_cast<long double>(inverse[j * stride + l]);
+                    }
+                    sum += static_cast<long double>(inverse[i * stride + k]) * row;
+                }
+                EXPECT_NEAR(static_cast<double>(sum), i == j ? 1.0 : 0.0, 1e-9) << n << " " << i << " " << j;
+            }
+            for (std::size_t j = i + 1; j < padded(n); ++j) EXPECT_EQ(inverse[i * stride + j], 0.0);
+        }
+    }
+}
+
+TEST(Dense, InverseOfFactorRefusesWhatIsNotPositiveDefinite) {
+    constexpr std::size_t kStride = 3 + kLaneFloats;
+    Matrix inverse(3 * kStride);
+    std::vector<double> scratch(3);
+    for (const double last : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+        Matrix a(3 * kStride, 0.0);
+        a[0] = a[kStride + 1] = 1.0;
+        a[2 * kStride + 2] = last;
+        EXPECT_FALSE(inverse_of_factor(a.data(), 3, kStride, inverse.data(), scratch.data())) << last;
+    }
+}
+
 TEST(Dense, CholeskyRefusesWhatIsNotPositiveDefinite) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const double infinity = std::numeric_limits<double>::infinity();

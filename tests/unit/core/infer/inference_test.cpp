@@ -18,6 +18,9 @@ struct Scene {
         auto scratch = std::make_unique<ShapeModelWorkspace>();
         build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
                           *model);
+        auto gaussian_scratch = std::make_unique<FaceGaussianWorkspace>();
+        build_face_gaussian(pack, *model, *gaussian_scratch, *gaussian);
+        reset_inference(*inference);
     }
 
     void see(const std::vector<Vec3>& positions, const std::vector<Mat3>& informations) {
@@ -30,13 +33,15 @@ struct Scene {
             named->markers[k].information = informations[k];
         }
         stabilise(*model, config, *named, *state, *workspace, *stabilised, report);
-        infer_missing(*model, *stabilised, *output);
+        infer_missing(*gaussian, *stabilised, *inference, *output);
     }
 
     test::SyntheticFace face{{}};
     StabiliserConfig config;
     StabiliserReport report;
     std::unique_ptr<ShapeModel> model = std::make_unique<ShapeModel>();
+    std::unique_ptr<FaceGaussian> gaussian = std::make_unique<FaceGaussian>();
+    std::unique_ptr<InferenceWorkspace> inference = std::make_unique<InferenceWorkspace>();
     std::unique_ptr<StabiliserState> state = std::make_unique<StabiliserState>();
     std::unique_ptr<StabiliserWorkspace> workspace = std::make_unique<StabiliserWorkspace>();
     std::unique_ptr<NamedMarkers> named = std::make_unique<NamedMarkers>();
@@ -135,12 +140,76 @@ TEST(Inference, OneViewKeepsTheDirectionAndTakesTheDepth) {
     EXPECT_LT(along2, 0.1 * wrong2);
 }
 
+TEST(Inference, ConfidenceIsOneWhereMeasuredAndLessElsewhere) {
+    Scene s;
+    const std::vector<Vec3> truth = s.face.positions(s.face.weights_at(1.0));
+    std::vector<Mat3> informations(60, 100.0 * Mat3::Identity());
+    for (std::size_t k = 0; k < 60; k += 9) informations[k] = Mat3::Zero();
+    informations[4] = Vec3{60.0, 60.0, 0.0}.asDiagonal();  // one view, along z
+    s.see(truth, informations);
+    for (std::size_t k = 0; k < 60; ++k) {
+        if (k % 9 != 0 && k != 4) {
+            EXPECT_EQ(s.output->confidence[k], 1.0F);
+            EXPECT_EQ(s.output->deviation_mm[k], 0.0F);
+            continue;
+        }
+        EXPECT_GT(s.output->confidence[k], 0.0F) << k;
+        EXPECT_LT(s.output->confidence[k], 1.0F) << k;
+        EXPECT_GT(s.output->deviation_mm[k], 0.0F) << k;
+        const double usual = std::sqrt(s.gaussian->prior_mm2[k]);
+        EXPECT_NEAR(static_cast<double>(s.output->confidence[k]),
+                    1.0 - static_cast<double>(s.output->deviation_mm[k]) / usual, 1e-5);
+    }
+}
+
+// What was worked out for the frame before may save time, and nothing else.
+TEST(Inference, DoesNotDependOnTheFrameBefore) {
+    Scene s;
+    const auto fresh = std::make_unique<InferenceWorkspace>();
+    const auto again = std::make_unique<InferenceOutput>();
+    for (int frame = 0; frame < 60; ++frame) {
+        const std::vector<Vec3> truth = s.face.positions(s.face.weights_at(frame / 20.0));
+        std::vector<Mat3> informations(60, 100.0 * Mat3::Identity());
+        // Patterns that stay for three frames: few hidden, many hidden, one view among them.
+        const std::size_t step = frame / 3 % 3 == 0 ? 13 : 2;
+        for (std::size_t k = 0; k < 60; k += step) informations[k] = Mat3::Zero();
+        if (frame / 3 % 3 == 2) informations[1] = Vec3{60.0, 60.0, 0.0}.asDiagonal();
+        s.see(truth, informations);
+        reset_inference(*fresh);
+        infer_missing(*s.gaussian, *s.stabilised, *fresh, *again);
+        for (std::size_t k = 0; k < 60; ++k) {
+            ASSERT_EQ(s.output->position_mm[k], again->position_mm[k]) << frame << " " << k;
+            ASSERT_EQ(s.output->confidence[k], again->confidence[k]) << frame << " " << k;
+        }
+    }
+}
+
+TEST(Inference, StaysNearTheMeanFaceWhateverWasMeasured) {
+    Scene s;
+    s.see(s.face.positions(s.face.weights_at(1.0)), std::vector<Mat3>(60, 100.0 * Mat3::Identity()));
+    for (const double far_mm : {1e3, 1e9, 1e200}) {
+        for (const std::size_t step : {2U, 11U}) {
+            for (std::size_t k = 0; k < 60; ++k) {
+                s.stabilised->markers[k].seen = k % step != 0;
+                s.stabilised->markers[k].information = (k % step != 0 ? 100.0 : 0.0) * Mat3::Identity();
+                s.stabilised->markers[k].position_mm = Vec3{far_mm, -far_mm, far_mm};
+            }
+            infer_missing(*s.gaussian, *s.stabilised, *s.inference, *s.output);
+            for (std::size_t k = 0; k < 60; k += step) {
+                const double gap = (s.output->position_mm[k] - s.gaussian->mean_mm[k]).norm();
+                EXPECT_LE(gap, 6.0001 * std::sqrt(s.gaussian->prior_mm2[k])) << far_mm << " " << k;
+            }
+        }
+    }
+}
+
 TEST(Inference, NothingSeenIsTheExpectedFace) {
     Scene s;
     s.see(std::vector<Vec3>(60, Vec3::Zero()), std::vector<Mat3>(60, Mat3::Zero()));
     EXPECT_EQ(s.output->inferred, 60);
     for (std::size_t k = 0; k < 60; ++k)
         EXPECT_LT((s.output->position_mm[k] - s.model->mean_mm[k]).norm(), 1e-12);
+    for (std::size_t k = 0; k < 60; ++k) EXPECT_NEAR(s.output->confidence[k], 0.0F, 1e-6F);
 }
 
 }  // namespace

@@ -169,7 +169,8 @@ TEST(ReadManifest, RefusesBadSectionTables) {
     };
     const Case cases[] = {
         {"type 0", [](ForgedPack& p) { p.set_section(2, 0, std::uint16_t{0}); }, PackError::kSectionUnknown},
-        {"type 24", [](ForgedPack& p) { p.set_section(2, 0, std::uint16_t{24}); },
+        {"type after the last",
+         [](ForgedPack& p) { p.set_section(2, 0, static_cast<std::uint16_t>(kSectionTypeCount + 1)); },
          PackError::kSectionUnknown},
         {"reserved", [](ForgedPack& p) { p.set_section(2, 2, std::uint16_t{1}); },
          PackError::kSectionUnknown},
@@ -308,10 +309,14 @@ TEST(ReadManifest, AsksForTheNewSolverInterfaceOnlyWhereItMatters) {
     };
     EXPECT_EQ(oldest(), kOldestSolverAbi);
     sample.view.rbf.kernel = RbfKernel::kMultiquadric;
-    EXPECT_EQ(oldest(), kSolverAbi);
+    EXPECT_EQ(oldest(), 2);
     sample.view.rbf.kernel = RbfKernel::kGaussian;
     sample.view.rbf.hull_far_widths = 2.0F;
-    EXPECT_EQ(oldest(), kSolverAbi);
+    EXPECT_EQ(oldest(), 2);
+    SamplePack sets({.marker_sets = true});
+    const AlignedBytes bytes(write_pack(sets.view, {}, sha256));
+    EXPECT_EQ(read_manifest(bytes.span(), sha256)->solver_abi_min, 3);
+    EXPECT_EQ(kSolverAbi, 3);
 }
 
 TEST(ReadManifest, RefusesSectionsThatBelongToAnotherSolver) {
