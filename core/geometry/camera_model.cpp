@@ -112,7 +112,49 @@ Vec2 distort_fisheye(const CameraModel& camera, const Vec3& x) {
     return {scale * x[0], scale * x[1]};
 }
 
+PixelSlope fisheye_plane_slope(const CameraModel& camera, const Vec3& x) {
+    PixelSlope slope = PixelSlope::Zero();
+    const double across = std::sqrt(x[0] * x[0] + x[1] * x[1]);
+    if (!(across > kNearAxis * x[2])) {
+        slope(0, 0) = slope(1, 1) = 1.0 / x[2];
+        slope(0, 2) = -x[0] / (x[2] * x[2]);
+        slope(1, 2) = -x[1] / (x[2] * x[2]);
+        return slope;
+    }
+    const double theta = atan2(across, x[2]);
+    const double rise = fisheye_slope(camera, theta) / (across * across + x[2] * x[2]);
+    const double scale = fisheye_radius(camera, theta) / across;
+    const double scale_across =
+        (rise * x[2] - scale) / across;  // slope of scale along the distance from the axis
+    for (int row = 0; row < 2; ++row) {
+        for (int column = 0; column < 2; ++column)
+            slope(row, column) = (row == column ? scale : 0.0) + x[row] * scale_across * x[column] / across;
+        slope(row, 2) = -x[row] * rise;
+    }
+    return slope;
+}
+
+PixelSlope rational_plane_slope(const CameraModel& camera, const Vec3& x) {
+    const Vec2 p{x[0] / x[2], x[1] / x[2]};
+    const Mat2 bend = distortion_slope(camera, p, radial_of(camera, p.dot(p)));
+    PixelSlope slope;
+    for (int row = 0; row < 2; ++row) {
+        slope(row, 0) = bend(row, 0) / x[2];
+        slope(row, 1) = bend(row, 1) / x[2];
+        slope(row, 2) = -(bend(row, 0) * p[0] + bend(row, 1) * p[1]) / x[2];
+    }
+    return slope;
+}
+
 }  // namespace
+
+PixelSlope pixel_slope_in_camera(const CameraModel& camera, const Vec3& x) {
+    PixelSlope slope =
+        camera.lens == LensModel::kFisheye ? fisheye_plane_slope(camera, x) : rational_plane_slope(camera, x);
+    slope.row(0) *= camera.fx_px;
+    slope.row(1) *= camera.fy_px;
+    return slope;
+}
 
 Projection project_in_camera(const CameraModel& camera, const Vec3& x) {
     Projection result;

@@ -50,6 +50,10 @@ struct Projection {
 // The same of a point in camera axes.
 [[nodiscard]] Projection project_in_camera(const CameraModel& camera, const Vec3& camera_point_mm);
 
+// Slope of that pixel along camera coordinates, px/mm. Precondition: camera_point_mm[2] > 0.
+using PixelSlope = Eigen::Matrix<double, 2, 3>;
+[[nodiscard]] PixelSlope pixel_slope_in_camera(const CameraModel& camera, const Vec3& camera_point_mm);
+
 // Unit direction, headset frame, of the ray through a distorted pixel. Fixed iteration count. Within 1e-8 px
 // of the pixel wherever the lens model rises; where it folds, the direction is finite and means nothing.
 [[nodiscard]] Vec3 pixel_ray(const CameraModel& camera, const Vec2& pixel);
