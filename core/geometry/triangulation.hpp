@@ -14,6 +14,7 @@ struct Sighting {
     Vec3 point_mm = Vec3::Zero();
     Vec3 direction = Vec3::Zero();
     double information = 1.0;  // 1/mm^2 across the ray (or in every direction, for a point)
+    double delay_us = 0.0;  // exposed that much after the frame's capture time: its row of a rolling shutter
 
     // Projector onto what the sighting measures: I - d d^T, or I for a point.
     [[nodiscard]] Mat3 projector() const { return Mat3::Identity() - direction * direction.transpose(); }

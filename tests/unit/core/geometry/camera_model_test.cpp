@@ -114,6 +114,32 @@ TEST(CameraModel, RayPassesThroughTheProjectedPoint) {
     }
 }
 
+TEST(CameraModel, SlopesAreThoseOfTheLongDoubleFormula) {
+    test::SeededRandom random(23);
+    CameraModel camera = posed_camera();
+    camera.camera_from_headset = Mat3::Identity();
+    camera.centre_mm = Vec3::Zero();
+    for (const Distortion& distortion : kDistortions) {
+        set_distortion(camera, distortion);
+        for (int i = 0; i < 100; ++i) {
+            Vec3 at{random.uniform(-90.0, 90.0), random.uniform(-70.0, 70.0), random.uniform(120.0, 300.0)};
+            if (i == 0) at = Vec3{0.0, 0.0, 150.0};
+            const PixelSlope slope = pixel_slope_in_camera(camera, at);
+            for (int axis = 0; axis < 3; ++axis) {
+                constexpr double kStep = 1e-2;
+                Vec3 ahead = at;
+                Vec3 behind = at;
+                ahead[axis] += kStep;
+                behind[axis] -= kStep;
+                const test::ReferencePixel a = test::reference_project(camera, ahead);
+                const test::ReferencePixel b = test::reference_project(camera, behind);
+                EXPECT_NEAR(slope(0, axis), static_cast<double>(a.x_px - b.x_px) / (2.0 * kStep), 1e-6);
+                EXPECT_NEAR(slope(1, axis), static_cast<double>(a.y_px - b.y_px) / (2.0 * kStep), 1e-6);
+            }
+        }
+    }
+}
+
 // The angle from the axis that a pixel of an equidistant lens stands for, by definition.
 TEST(CameraModel, AFisheyesPixelsStandForAngles) {
     CameraModel camera = posed_camera();
