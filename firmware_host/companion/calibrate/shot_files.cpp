@@ -65,7 +65,7 @@ Result<NamedShots, FileError> shots_of_pattern(const fs::path& pattern) {
     const std::string before = name.substr(0, star);
     const std::string after = name.substr(star + 1);
     NamedShots out;
-    out.camera = before + fs::path(after).stem().string();
+    out.camera = before + after.substr(0, after.rfind('.'));
     while (!out.camera.empty() && (out.camera.back() == '_' || out.camera.back() == '-'))
         out.camera.pop_back();
     while (!out.camera.empty() && (out.camera.front() == '_' || out.camera.front() == '-'))

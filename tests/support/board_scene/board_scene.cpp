@@ -184,7 +184,7 @@ std::vector<CameraModel> board_rig(LensModel lens, std::size_t camera_count) {
             camera.p1 = 6e-4;
             camera.p2 = -4e-4;
         }
-        camera.centre_mm = centres[c];
+        camera.centre_mm = camera_count == 1 ? Vec3{0.0, -48.0, 232.0} : centres[c];
         const Vec3 forward = (aim - camera.centre_mm).normalized();
         const Vec3 down = (Vec3{0.0, -1.0, 0.0} + forward[1] * forward).normalized();
         camera.camera_from_headset.row(0) = down.cross(forward).transpose();
