@@ -59,6 +59,33 @@ CameraModel camera_from(const fb::Camera& stored) {
     return camera;
 }
 
+void add_lens(const fb::CameraLens& stored, CameraModel& camera) {
+    camera.lens = static_cast<LensModel>(stored.model());
+    camera.k4 = stored.k4();
+    camera.k5 = stored.k5();
+    camera.k6 = stored.k6();
+    camera.row_time_us = stored.row_time_us();
+}
+
+Result<void, PackError> read_cameras(const fb::Manifest& stored, PackManifest& out) {
+    const auto* cameras = stored.cameras();
+    const auto* lenses = stored.camera_lenses();
+    const std::size_t camera_count = cameras == nullptr ? 0 : cameras->size();
+    const std::size_t lens_count = lenses == nullptr ? 0 : lenses->size();
+    if (camera_count > kMaxCameras || (lens_count != 0 && lens_count != camera_count))
+        return failure(PackError::kCameraCount);
+    for (std::uint32_t c = 0; c < camera_count; ++c) {
+        CameraModel camera = camera_from(*cameras->Get(c));
+        if (lens_count != 0) {
+            if (lenses->Get(c)->model() > static_cast<std::uint8_t>(LensModel::kFisheye))
+                return failure(PackError::kCameraIntrinsics);
+            add_lens(*lenses->Get(c), camera);
+        }
+        if (!out.cameras.push_back(camera)) return failure(PackError::kCameraCount);
+    }
+    return {};
+}
+
 // The verifier of FlatBuffers sees to the alignment of a vector's length, not to that of its structs. An
 // empty one has none to align.
 template <class T>
@@ -120,11 +147,7 @@ Result<void, PackError> read_counts(const fb::Manifest& stored, PackManifest& ou
     out.rbf_kernel = static_cast<RbfKernel>(stored.rbf_kernel());
     out.rbf_hull_near_widths = stored.rbf_hull_near_widths();
     out.rbf_hull_far_widths = stored.rbf_hull_far_widths();
-    if (stored.cameras() != nullptr) {
-        for (const fb::Camera* camera : *stored.cameras()) {
-            if (!out.cameras.push_back(camera_from(*camera))) return failure(PackError::kCameraCount);
-        }
-    }
+    if (auto ok = read_cameras(stored, out); !ok) return failure(ok.error());
     out.memory_bytes = stored.memory_bytes();
     if (out.memory_bytes < out.total_bytes || out.memory_bytes > kMaxPackBytes)
         return failure(PackError::kMemory);
@@ -294,7 +317,8 @@ Result<PackManifest, PackError> read_manifest(ByteSpan bytes, HashFunction hash)
     flatbuffers::Verifier verifier(data, raw.size(), /*max_depth=*/8, /*max_tables=*/64);
     if (raw.size() < 8 || !fb::VerifyManifestBuffer(verifier)) return failure(PackError::kManifestStructure);
     const fb::Manifest& stored = *fb::GetManifest(data);
-    if (!is_aligned(stored.sections()) || !is_aligned(stored.cameras()))
+    if (!is_aligned(stored.sections()) || !is_aligned(stored.cameras()) ||
+        !is_aligned(stored.camera_lenses()))
         return failure(PackError::kManifestStructure);
 
     if (auto ok = read_identity(stored, out); !ok) return failure(ok.error());

@@ -20,6 +20,7 @@ constexpr double kMinWidthMm = 1e-3;
 constexpr double kMinVarianceMm2 = 1e-9;  // of a mode: under any camera's noise
 constexpr double kMaxHullWidths = 1e3;
 constexpr double kOrthonormalTolerance = 1e-3;  // rows stored as float32; a wrong basis misses by far more
+constexpr double kMaxRowTimeUs = 1000.0;        // a picture of 480 rows would take half a second
 constexpr double kRotationTolerance = 1e-4;     // calibration files print six digits and more
 
 struct Bounds {
@@ -274,13 +275,18 @@ Result<void, PackError> check_camera(const CameraModel& camera) {
     };
     const double width = camera.width_px;
     const double height = camera.height_px;
-    const bool plausible = camera.width_px >= 1 && camera.width_px <= static_cast<int>(kMaxImageWidth) &&
-                           camera.height_px >= 1 && camera.height_px <= static_cast<int>(kMaxImageHeight) &&
-                           inside(camera.fx_px, 1.0, 1e5) && inside(camera.fy_px, 1.0, 1e5) &&
-                           inside(camera.cx_px, -width, 2.0 * width) &&
-                           inside(camera.cy_px, -height, 2.0 * height) && inside(camera.k1, -10.0, 10.0) &&
-                           inside(camera.k2, -10.0, 10.0) && inside(camera.k3, -10.0, 10.0) &&
-                           inside(camera.p1, -1.0, 1.0) && inside(camera.p2, -1.0, 1.0);
+    const bool fisheye = camera.lens == LensModel::kFisheye;
+    const double tangential = fisheye ? 0.0 : 1.0;
+    const double denominator = fisheye ? 0.0 : 10.0;
+    const bool plausible =
+        camera.width_px >= 1 && camera.width_px <= static_cast<int>(kMaxImageWidth) &&
+        camera.height_px >= 1 && camera.height_px <= static_cast<int>(kMaxImageHeight) &&
+        inside(camera.fx_px, 1.0, 1e5) && inside(camera.fy_px, 1.0, 1e5) &&
+        inside(camera.cx_px, -width, 2.0 * width) && inside(camera.cy_px, -height, 2.0 * height) &&
+        inside(camera.k1, -10.0, 10.0) && inside(camera.k2, -10.0, 10.0) && inside(camera.k3, -10.0, 10.0) &&
+        inside(camera.p1, -tangential, tangential) && inside(camera.p2, -tangential, tangential) &&
+        inside(camera.k4, -10.0, 10.0) && inside(camera.k5, -denominator, denominator) &&
+        inside(camera.k6, -denominator, denominator) && inside(camera.row_time_us, 0.0, kMaxRowTimeUs);
     if (!plausible) return failure(PackError::kCameraIntrinsics);
     const Mat3& r = camera.camera_from_headset;
     for (int i = 0; i < 9; ++i) {

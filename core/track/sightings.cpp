@@ -33,6 +33,7 @@ void add_camera_view(const CameraModel& camera, std::span<const Observation> obs
         sighting.direction = pixel_ray(camera, Vec2{static_cast<double>(observations[i].x_px),
                                                     static_cast<double>(observations[i].y_px)});
         sighting.information = 1.0 / (sigma_mm * sigma_mm);
+        sighting.delay_us = row_delay_us(camera, static_cast<double>(observations[i].y_px));
         if (finite(sighting.direction)) append(set, view, i, sighting);
     }
 }

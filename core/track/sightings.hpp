@@ -34,8 +34,8 @@ struct SightingSet {
     }
 };
 
-// Rays of one camera's observations. sigma_px: standard deviation of a blob's centre; expected_depth_mm:
-// where the face is, to turn pixels into millimetres across the ray.
+// Rays of one camera's observations, each with the delay of its row. sigma_px: standard deviation of a blob's
+// centre; expected_depth_mm: where the face is, to turn pixels into millimetres across the ray.
 void add_camera_view(const CameraModel& camera, std::span<const Observation> observations, double sigma_px,
                      double expected_depth_mm, SightingSet& set);
 

@@ -267,18 +267,30 @@ ReferencePixel reference_project(const CameraModel& camera, const Vec3& headset_
                                                 static_cast<long double>(camera.centre_mm[c]));
         }
     }
+    const auto pixel = [&](long double xd, long double yd) {
+        return ReferencePixel{
+            static_cast<long double>(camera.fx_px) * xd + static_cast<long double>(camera.cx_px),
+            static_cast<long double>(camera.fy_px) * yd + static_cast<long double>(camera.cy_px), in[2]};
+    };
     const long double x = in[0] / in[2];
     const long double y = in[1] / in[2];
+    const auto k = [](double value) { return static_cast<long double>(value); };
+    if (camera.lens == LensModel::kFisheye) {
+        const long double r = std::sqrt(x * x + y * y);
+        const long double t = std::atan(r);
+        const long double t2 = t * t;
+        const long double bent = t * (1.0L + k(camera.k1) * t2 + k(camera.k2) * t2 * t2 +
+                                      k(camera.k3) * t2 * t2 * t2 + k(camera.k4) * t2 * t2 * t2 * t2);
+        return r > 0.0L ? pixel(bent * x / r, bent * y / r) : pixel(0.0L, 0.0L);
+    }
     const long double r2 = x * x + y * y;
-    const long double radial = 1.0L + static_cast<long double>(camera.k1) * r2 +
-                               static_cast<long double>(camera.k2) * r2 * r2 +
-                               static_cast<long double>(camera.k3) * r2 * r2 * r2;
-    const long double p1 = static_cast<long double>(camera.p1);
-    const long double p2 = static_cast<long double>(camera.p2);
-    const long double xd = x * radial + 2.0L * p1 * x * y + p2 * (r2 + 2.0L * x * x);
-    const long double yd = y * radial + p1 * (r2 + 2.0L * y * y) + 2.0L * p2 * x * y;
-    return {static_cast<long double>(camera.fx_px) * xd + static_cast<long double>(camera.cx_px),
-            static_cast<long double>(camera.fy_px) * yd + static_cast<long double>(camera.cy_px), in[2]};
+    const long double radial =
+        (1.0L + k(camera.k1) * r2 + k(camera.k2) * r2 * r2 + k(camera.k3) * r2 * r2 * r2) /
+        (1.0L + k(camera.k4) * r2 + k(camera.k5) * r2 * r2 + k(camera.k6) * r2 * r2 * r2);
+    const long double p1 = k(camera.p1);
+    const long double p2 = k(camera.p2);
+    return pixel(x * radial + 2.0L * p1 * x * y + p2 * (r2 + 2.0L * x * x),
+                 y * radial + p1 * (r2 + 2.0L * y * y) + 2.0L * p2 * x * y);
 }
 
 }  // namespace rig::test

@@ -93,7 +93,7 @@ class SyntheticFace {
 [[nodiscard]] std::vector<Vec3> moved(const Rigid& pose, std::span<const Vec3> points);
 void add_noise(std::span<Vec3> points, double sigma_mm, SeededRandom& random);
 
-// Brown-Conrady projection in long double from the published formula, independent of core's.
+// Projection through either lens model in long double from the published formulas, independent of core's.
 struct ReferencePixel {
     long double x_px;
     long double y_px;

@@ -65,6 +65,10 @@ double column_mm(const SolvePack& pack, std::size_t i) {
     return std::sqrt(sum);
 }
 
+const char* lens_name(const CameraModel& camera) {
+    return camera.lens == LensModel::kFisheye ? "fisheye" : "rational";
+}
+
 json camera_json(const CameraModel& camera) {
     json rotation = json::array();
     for (int r = 0; r < 3; ++r) {
@@ -82,6 +86,11 @@ json camera_json(const CameraModel& camera) {
             {"p1", camera.p1},
             {"p2", camera.p2},
             {"k3", camera.k3},
+            {"k4", camera.k4},
+            {"k5", camera.k5},
+            {"k6", camera.k6},
+            {"lens", lens_name(camera)},
+            {"row_time_us", camera.row_time_us},
             {"R", rotation},
             {"centre_mm", {camera.centre_mm[0], camera.centre_mm[1], camera.centre_mm[2]}}};
 }
@@ -205,11 +214,11 @@ void print_tables(const OpenedPack& opened) {
     for (std::size_t c = 0; c < pack.camera_count; ++c) {
         const CameraModel& camera = pack.cameras[c];
         fmt::print(
-            "  {}  {} x {} px  f {:.2f} {:.2f}  c {:.2f} {:.2f}  k {:.4g} {:.4g} {:.4g}  p {:.4g} {:.4g}  "
-            "at {:.1f} {:.1f} {:.1f} mm\n",
-            c, camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px,
-            camera.k1, camera.k2, camera.k3, camera.p1, camera.p2, camera.centre_mm[0], camera.centre_mm[1],
-            camera.centre_mm[2]);
+            "  {}  {} x {} px  {}  f {:.2f} {:.2f}  c {:.2f} {:.2f}  k {:.4g} {:.4g} {:.4g} {:.4g} {:.4g} "
+            "{:.4g}  p {:.4g} {:.4g}  row {:.3g} us  at {:.1f} {:.1f} {:.1f} mm\n",
+            c, camera.width_px, camera.height_px, lens_name(camera), camera.fx_px, camera.fy_px, camera.cx_px,
+            camera.cy_px, camera.k1, camera.k2, camera.k3, camera.k4, camera.k5, camera.k6, camera.p1,
+            camera.p2, camera.row_time_us, camera.centre_mm[0], camera.centre_mm[1], camera.centre_mm[2]);
     }
     for (std::size_t r = 0; r < pack.region_count; ++r) {
         const RegionModel& region = pack.regions[r];

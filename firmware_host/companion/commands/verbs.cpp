@@ -8,6 +8,7 @@ void add_all_verbs(CLI::App& app, int& exit_code) {
     add_sample_verb(app, exit_code);
     add_import_verb(app, exit_code);
     add_world_verb(app, exit_code);
+    add_calibrate_verb(app, exit_code);
     add_fit_verb(app, exit_code);
     add_train_verb(app, exit_code);
     add_keyshapes_verb(app, exit_code);

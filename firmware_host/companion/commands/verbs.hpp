@@ -16,6 +16,7 @@ inline constexpr int kExitInterrupted = 130;
 
 // Each adds its subcommand to `app` and stores its exit code in `exit_code` when it is run. One a line, in
 // alphabetical order.
+void add_calibrate_verb(CLI::App& app, int& exit_code);
 void add_control_verb(CLI::App& app, int& exit_code);
 void add_demo_verb(CLI::App& app, int& exit_code);
 void add_detect_verb(CLI::App& app, int& exit_code);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -33,6 +34,17 @@ class EntryReader {
         }
         if (otherwise) return *otherwise;
         return missing(fmt::format("\"{}\" is missing", key));
+    }
+    LensModel lens() {
+        for (const json* place : {&entry_, &file_}) {
+            const auto found = place->find("lens");
+            if (found == place->end()) continue;
+            if (*found == "rational") return LensModel::kRational;
+            if (*found == "fisheye") return LensModel::kFisheye;
+            missing("\"lens\" is neither \"rational\" nor \"fisheye\"");
+            return LensModel::kRational;
+        }
+        return LensModel::kRational;
     }
     int pixels(const char* key) {
         const double value = number(key);
@@ -76,8 +88,13 @@ CameraModel read_camera(EntryReader& read, bool one_focal_length) {
     camera.k1 = read.number("k1", 0.0);
     camera.k2 = read.number("k2", 0.0);
     camera.k3 = read.number("k3", 0.0);
+    camera.k4 = read.number("k4", 0.0);
+    camera.k5 = read.number("k5", 0.0);
+    camera.k6 = read.number("k6", 0.0);
     camera.p1 = read.number("p1", 0.0);
     camera.p2 = read.number("p2", 0.0);
+    camera.lens = read.lens();
+    camera.row_time_us = read.number("row_time_us", 0.0);
     for (std::size_t i = 0; i < 9; ++i) {
         camera.camera_from_headset(static_cast<int>(i) / 3, static_cast<int>(i) % 3) =
             read.element("R", i / 3, i % 3);
@@ -90,6 +107,37 @@ std::string letter_of(const json& entry, std::size_t index) {
     const auto found = entry.find("camera");
     return found != entry.end() && found->is_string() ? found->get<std::string>()
                                                       : fmt::format("number {}", index + 1);
+}
+
+nlohmann::ordered_json entry_of(const CameraEntry& entry) {
+    const CameraModel& camera = entry.model;
+    nlohmann::ordered_json rotation = nlohmann::ordered_json::array();
+    for (int r = 0; r < 3; ++r) {
+        const auto row = camera.camera_from_headset.row(r);
+        rotation.push_back({row[0], row[1], row[2]});
+    }
+    return {{"camera", entry.name},
+            {"width", camera.width_px},
+            {"height", camera.height_px},
+            {"lens", camera.lens == LensModel::kFisheye ? "fisheye" : "rational"},
+            {"fx_px", camera.fx_px},
+            {"fy_px", camera.fy_px},
+            {"cx", camera.cx_px},
+            {"cy", camera.cy_px},
+            {"k1", camera.k1},
+            {"k2", camera.k2},
+            {"p1", camera.p1},
+            {"p2", camera.p2},
+            {"k3", camera.k3},
+            {"k4", camera.k4},
+            {"k5", camera.k5},
+            {"k6", camera.k6},
+            {"row_time_us", camera.row_time_us},
+            {"R", rotation},
+            {"centre_mm", {camera.centre_mm[0], camera.centre_mm[1], camera.centre_mm[2]}},
+            {"rms_px", entry.rms_px},
+            {"views", entry.view_count},
+            {"points", entry.point_count}};
 }
 
 // The entries that are cameras, one for each letter.
@@ -144,6 +192,22 @@ Result<std::vector<CameraModel>, FileError> load_cameras(const std::filesystem::
     if (!text) return failure(text.error());
     if (text->size() > kMaxCameraFileBytes) return file_failure(path, "is too large for a list of cameras");
     return parse_cameras(*text, path);
+}
+
+Result<void, FileError> save_cameras(const std::filesystem::path& path, std::span<const CameraEntry> cameras,
+                                     const std::string& note) {
+    nlohmann::ordered_json file;
+    file["note"] = note;
+    file["units"] =
+        "pixels and millimetres; integer px = pixel centre, origin top-left; X_cam = R (X_headset - centre), "
+        "camera axes x right, y down, z forward; row_time_us in microseconds a row";
+    file["cameras"] = nlohmann::ordered_json::array();
+    for (const CameraEntry& camera : cameras) file["cameras"].push_back(entry_of(camera));
+    std::ofstream out(path, std::ios::trunc);
+    out << file.dump(1) << '\n';
+    out.close();
+    if (!out) return file_failure(path, "cannot be written; does the folder exist and is there space?");
+    return {};
 }
 
 }  // namespace rig::host

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <span>
+#include <vector>
 
 #include "core/pack/manifest_generated.h"
 #include "firmware_host/pack_file/opened_pack.hpp"
@@ -153,6 +154,23 @@ fb::Camera stored_camera(const CameraModel& camera) {
             flatbuffers::span<const double, 3>(centre.data(), centre.size())};
 }
 
+bool has_new_lens(const CameraModel& camera) {
+    return camera.lens != LensModel::kRational || camera.k4 != 0.0 || camera.k5 != 0.0 || camera.k6 != 0.0 ||
+           camera.row_time_us != 0.0;
+}
+
+// Empty when every camera is one that older cores know.
+std::vector<fb::CameraLens> stored_lenses(const SolvePack& pack) {
+    const std::span<const CameraModel> cameras(pack.cameras.data(), pack.camera_count);
+    std::vector<fb::CameraLens> lenses;
+    if (std::ranges::none_of(cameras, has_new_lens)) return lenses;
+    for (const CameraModel& camera : cameras) {
+        lenses.emplace_back(static_cast<std::uint8_t>(camera.lens), std::uint8_t{0}, std::uint16_t{0}, 0U,
+                            camera.k4, camera.k5, camera.k6, camera.row_time_us);
+    }
+    return lenses;
+}
+
 // A version 8 UUID (RFC 9562: contents are ours to choose) of the contents.
 std::array<std::uint8_t, 16> uuid_of(const std::vector<SectionData>& sections, const PackIdentity& identity) {
     std::vector<std::byte> all;
@@ -186,9 +204,9 @@ std::vector<fb::Section> table_of(const std::vector<SectionData>& sections, std:
 // An older core refuses marker sets; a still older one would take any kernel for the Gaussian and never fall
 // back.
 std::uint16_t oldest_core_for(const SolvePack& pack) {
-    constexpr std::uint16_t kMarkerSetAbi = 3;
+    constexpr std::uint16_t kMarkerSetAndLensAbi = 3;
     constexpr std::uint16_t kRbfKernelAbi = 2;
-    if (pack.marker_set_count > 0) return kMarkerSetAbi;
+    if (pack.marker_set_count > 0 || !stored_lenses(pack).empty()) return kMarkerSetAndLensAbi;
     const bool gaussian = pack.rbf.kernel == RbfKernel::kGaussian && pack.rbf.hull_far_widths == 0.0F;
     return gaussian ? kOldestSolverAbi : kRbfKernelAbi;
 }
@@ -206,6 +224,8 @@ std::vector<std::byte> manifest_of(const SolvePack& pack, const PackIdentity& id
     const auto name = builder.CreateString(identity.name);
     const auto boards = builder.CreateVectorOfStrings(identity.boards);
     const auto camera_vector = builder.CreateVectorOfStructs(cameras);
+    const std::vector<fb::CameraLens> lenses = stored_lenses(pack);
+    const auto lens_vector = builder.CreateVectorOfStructs(lenses);
     const auto section_vector = builder.CreateVectorOfStructs(table);
     fb::ManifestBuilder manifest(builder);
     manifest.add_uuid(&uuid);
@@ -231,6 +251,7 @@ std::vector<std::byte> manifest_of(const SolvePack& pack, const PackIdentity& id
     manifest.add_rbf_hull_near_widths(pack.rbf.hull_near_widths);
     manifest.add_rbf_hull_far_widths(pack.rbf.hull_far_widths);
     manifest.add_region_count(pack.region_count);
+    if (!lenses.empty()) manifest.add_camera_lenses(lens_vector);
     fb::FinishManifestBuffer(builder, manifest.Finish());
     const auto raw = std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize()));
     return {raw.begin(), raw.end()};

@@ -48,6 +48,17 @@ bool is_rotation(const Mat3d& m) {
 }
 
 // nlohmann's accessors throw on a wrong type or an absent key; load_helmet() turns that into its error.
+// Empty when the entry's lens is one that the world draws.
+std::string fault_of_lens(const Json& entry) {
+    bool drawn =
+        !entry.is_object() || (!entry.contains("fx_px") && entry.value("lens", "rational") == "rational");
+    for (const char* key : {"p1", "p2", "k3", "k4", "k5", "k6"})
+        drawn = drawn && (!entry.is_object() || entry.value(key, 0.0) == 0.0);
+    return drawn ? std::string()
+                 : "the simulated world draws lenses of one focal length \"f_px\" with k1 and k2 only; a "
+                   "calibrated lens is for `headrig train --cameras`";
+}
+
 HelmetCamera parsed(const Json& entry) {
     HelmetCamera camera;
     camera.name = entry.at("camera").get<std::string>();
@@ -153,7 +164,11 @@ Result<std::vector<HelmetCamera>, FileError> load_helmet(const std::filesystem::
                 fmt::format("{}: has no \"cameras\" array; `headrig world --calibration FILE` writes one",
                             path.string())});
         }
-        for (const Json& entry : document.at("cameras")) cameras.push_back(parsed(entry));
+        for (const Json& entry : document.at("cameras")) {
+            if (const std::string fault = fault_of_lens(entry); !fault.empty())
+                return failure(FileError{fmt::format("{}: {}", path.string(), fault)});
+            cameras.push_back(parsed(entry));
+        }
     } catch (const Json::exception& error) {
         return failure(FileError{fmt::format("{}: {}", path.string(), error.what())});
     }

@@ -1,5 +1,5 @@
-// solver_digest    solves generated trajectories, the box QP alone and the whole stage with each solver, and
-// prints one digest of every weight's bits. The same
+// solver_digest    solves generated trajectories, the box QP alone and the whole stage with each solver, adds
+// lenses, views and mounts, and prints one digest of every number's bits. The same
 // source is built several times, with other optimisation and other instruction sets;
 // tests/replay/solver_digests compares what they print. "unsupported" where the processor lacks what the
 // build was made for.
@@ -12,6 +12,7 @@
 #include "core/solve/nnls.hpp"
 #include "core/solve/simplex_qp.hpp"
 #include "core/solve/solver.hpp"
+#include "tests/replay/solver_digests/geometry_digest.hpp"
 #include "tests/support/digest.hpp"
 #include "tests/support/random.hpp"
 #include "tests/support/solver_problems.hpp"
@@ -259,6 +260,7 @@ int main() {
     for (const SolverKind solver :
          {SolverKind::kLeastSquares, SolverKind::kNonNegative, SolverKind::kBoxQp, SolverKind::kRbf})
         run_stage(solver, digest);
+    add_geometry(digest);
     std::printf("%016llx\n", static_cast<unsigned long long>(digest.value()));
     return 0;
 }

@@ -313,10 +313,43 @@ TEST(ReadManifest, AsksForTheNewSolverInterfaceOnlyWhereItMatters) {
     sample.view.rbf.kernel = RbfKernel::kGaussian;
     sample.view.rbf.hull_far_widths = 2.0F;
     EXPECT_EQ(oldest(), 2);
+    const CameraModel plain = sample.view.cameras[0];
+    sample.view.cameras[0].k5 = 0.1;
+    EXPECT_EQ(oldest(), 3);
+    sample.view.cameras[0] = plain;
+    sample.view.cameras[0].row_time_us = 20.0;
+    EXPECT_EQ(oldest(), 3);
+    sample.view.cameras[0] = plain;
+    sample.view.cameras[0].lens = LensModel::kFisheye;
+    sample.view.cameras[0].p1 = sample.view.cameras[0].p2 = 0.0;
+    EXPECT_EQ(oldest(), 3);
     SamplePack sets({.marker_sets = true});
     const AlignedBytes bytes(write_pack(sets.view, {}, sha256));
     EXPECT_EQ(read_manifest(bytes.span(), sha256)->solver_abi_min, 3);
     EXPECT_EQ(kSolverAbi, 3);
+}
+
+TEST(ReadManifest, ALensComesBackAndAnUnknownOneIsRefused) {
+    SamplePack sample({.cameras = 2});
+    CameraModel& camera = sample.view.cameras[1];
+    camera.k4 = 0.25;
+    camera.k5 = -0.5;
+    camera.k6 = 0.125;
+    camera.row_time_us = 18.5;
+    AlignedBytes bytes(write_pack(sample.view, {}, sha256));
+    const auto manifest = read_manifest(bytes.span(), sha256);
+    ASSERT_TRUE(manifest.has_value());
+    EXPECT_EQ(manifest->cameras[0].k4, 0.0);
+    EXPECT_EQ(manifest->cameras[1].k4, 0.25);
+    EXPECT_EQ(manifest->cameras[1].k5, -0.5);
+    EXPECT_EQ(manifest->cameras[1].k6, 0.125);
+    EXPECT_EQ(manifest->cameras[1].row_time_us, 18.5);
+    EXPECT_EQ(manifest->cameras[1].lens, LensModel::kRational);
+    camera.lens = static_cast<LensModel>(2);
+    const AlignedBytes unknown(write_pack(sample.view, {}, sha256));
+    const auto refused = read_manifest(unknown.span(), sha256);
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_EQ(refused.error(), PackError::kCameraIntrinsics);
 }
 
 TEST(ReadManifest, RefusesSectionsThatBelongToAnotherSolver) {

@@ -249,6 +249,22 @@ TEST(OpenPack, RefusesImplausibleCameras) {
     with([&](CameraModel& c) { c.k3 = nan; }, PackError::kCameraIntrinsics);
     with([&](CameraModel& c) { c.p1 = nan; }, PackError::kCameraIntrinsics);
     with([&](CameraModel& c) { c.p2 = -2.0; }, PackError::kCameraIntrinsics);
+    with([&](CameraModel& c) { c.k4 = nan; }, PackError::kCameraIntrinsics);
+    with([&](CameraModel& c) { c.k5 = -11.0; }, PackError::kCameraIntrinsics);
+    with([&](CameraModel& c) { c.k6 = inf; }, PackError::kCameraIntrinsics);
+    with([&](CameraModel& c) { c.row_time_us = -1.0; }, PackError::kCameraIntrinsics);
+    with([&](CameraModel& c) { c.row_time_us = 2000.0; }, PackError::kCameraIntrinsics);
+    const auto fisheye = [&](auto change) {
+        with(
+            [&](CameraModel& c) {
+                c.lens = LensModel::kFisheye;
+                c.p1 = c.p2 = 0.0;
+                change(c);
+            },
+            PackError::kCameraIntrinsics);
+    };
+    fisheye([](CameraModel& c) { c.p1 = 1e-3; });  // the model has no such term
+    fisheye([](CameraModel& c) { c.k5 = 1e-3; });
     with([&](CameraModel& c) { c.camera_from_headset(0, 0) = nan; }, PackError::kCameraRotation);
     with([&](CameraModel& c) { c.camera_from_headset *= 1.01; }, PackError::kCameraRotation);
     with([&](CameraModel& c) { c.camera_from_headset.setZero(); }, PackError::kCameraRotation);

@@ -107,5 +107,27 @@ TEST(Sightings, ClearForgetsEverything) {
     EXPECT_FALSE(set->from_cameras) << "a marker stream after camera frames is not from cameras";
 }
 
+TEST(Sightings, CarryTheDelayOfTheirRow) {
+    CameraModel camera;
+    camera.width_px = 640;
+    camera.height_px = 481;
+    camera.fx_px = camera.fy_px = 500.0;
+    camera.cx_px = 319.5;
+    camera.cy_px = 240.0;
+    std::vector<Observation> dots(3);
+    dots[0].x_px = dots[1].x_px = dots[2].x_px = 300.0F;
+    dots[1].y_px = 240.0F;
+    dots[2].y_px = 480.0F;
+    for (const double row_time_us : {0.0, 25.0}) {
+        camera.row_time_us = row_time_us;
+        auto set = std::make_unique<SightingSet>();
+        add_camera_view(camera, dots, 0.1, 200.0, *set);
+        ASSERT_EQ(set->views[0].size(), 3U);
+        EXPECT_EQ(set->views[0][0].delay_us, -240.0 * row_time_us);
+        EXPECT_EQ(set->views[0][1].delay_us, 0.0);
+        EXPECT_EQ(set->views[0][2].delay_us, 240.0 * row_time_us);
+    }
+}
+
 }  // namespace
 }  // namespace rig

@@ -1,0 +1,181 @@
+// The verb as a script meets it: pictures on disk in, cameras.json and coverage pictures out, errors by file.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "firmware_host/companion/commands/verbs.hpp"
+#include "firmware_host/companion/files/image_file.hpp"
+#include "firmware_host/companion/train/camera_file.hpp"
+#include "tests/support/board_scene/board_scene.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/firmware_host/companion/commands/verb_run.hpp"
+
+namespace {
+
+using namespace rig;
+namespace fs = std::filesystem;
+
+constexpr const char* kBoard = "charuco:9x7:12";
+
+test::VerbOutcome run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"calibrate", "cameras"});
+    return test::run_verb(host::add_calibrate_verb, std::move(arguments));
+}
+
+bool has(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+// Two cameras, eight moments, drawn once for all tests of this file.
+class CalibrateVerb : public testing::Test {
+  protected:
+    static void SetUpTestSuite() {
+        shared = new test::TempFolder;
+        truth = new std::vector<CameraModel>(test::board_rig(LensModel::kRational, 2));
+        const host::BoardSpec board = *host::parse_board(kBoard);
+        test::SeededRandom random(77);
+        const std::vector<Rigid> poses = test::waved_board(board, 8, 0.6, random);
+        for (std::size_t c = 0; c < 2; ++c) {
+            const fs::path folder = shared->path() / (c == 0 ? "left" : "right");
+            fs::create_directories(folder);
+            const test::BoardScene scene(board, (*truth)[c]);
+            for (std::size_t v = 0; v < poses.size(); ++v) {
+                const host::GreyImage image = scene.draw(poses[v], {}, random);
+                const auto written =
+                    host::write_grey_image(folder / (std::to_string(v) + ".png"), image.view());
+                ASSERT_TRUE(written.has_value());
+            }
+        }
+    }
+    static void TearDownTestSuite() {
+        delete shared;
+        delete truth;
+    }
+
+    // A copy that a test may spoil.
+    void copy_shots() {
+        for (const char* name : {"left", "right"})
+            fs::copy(shared->path() / name, folder.path() / name, fs::copy_options::recursive);
+    }
+    [[nodiscard]] std::string at(const std::string& name) const { return (folder.path() / name).string(); }
+    [[nodiscard]] std::vector<std::string> arguments() const {
+        return {"--board", kBoard, "--images", at("left"), at("right"), "--out", at("cameras.json")};
+    }
+
+    static test::TempFolder* shared;
+    static std::vector<CameraModel>* truth;
+    test::TempFolder folder;
+};
+
+test::TempFolder* CalibrateVerb::shared = nullptr;
+std::vector<CameraModel>* CalibrateVerb::truth = nullptr;
+
+TEST_F(CalibrateVerb, WritesCamerasThatOtherVerbsReadAndAPictureOfEach) {
+    copy_shots();
+    std::vector<std::string> all = arguments();
+    for (const char* more : {"--row-time-us", "18.5"}) all.emplace_back(more);
+    const test::VerbOutcome outcome = run(all);
+    ASSERT_EQ(outcome.exit_code, host::kExitOk) << outcome.err;
+    const auto cameras = host::load_cameras(at("cameras.json"));
+    ASSERT_TRUE(cameras.has_value()) << cameras.error().message;
+    ASSERT_EQ(cameras->size(), 2U);
+    EXPECT_NEAR(((*cameras)[1].centre_mm - (*cameras)[0].centre_mm).norm(), 90.0, 0.05);
+    for (std::size_t c = 0; c < 2; ++c) {
+        EXPECT_NEAR((*cameras)[c].fx_px / (*truth)[c].fx_px, 1.0, 1e-3);
+        EXPECT_EQ((*cameras)[c].row_time_us, 18.5);
+        EXPECT_NE((*cameras)[c].k4, 0.0);
+    }
+    EXPECT_TRUE(has(outcome.out, "baseline left to right: 90.0")) << outcome.out;
+    EXPECT_TRUE(has(outcome.err, "warning: camera left: 8 pictures")) << outcome.err;
+    const auto picture = host::read_grey_image(at("cameras_coverage_right.png"));
+    ASSERT_TRUE(picture.has_value()) << picture.error().message;
+    EXPECT_EQ(picture->width_px, 960);
+}
+
+TEST_F(CalibrateVerb, AReferencePutsTheRigWhereTheHelmetHasIt) {
+    copy_shots();
+    const std::vector<host::CameraEntry> entries{{"left", (*truth)[0]}, {"right", (*truth)[1]}};
+    ASSERT_TRUE(host::save_cameras(at("helmet.json"), entries, "construction").has_value());
+    std::vector<std::string> all = arguments();
+    for (const std::string& more : {std::string("--reference"), at("helmet.json")}) all.push_back(more);
+    const test::VerbOutcome outcome = run(all);
+    ASSERT_EQ(outcome.exit_code, host::kExitOk) << outcome.err;
+    const auto cameras = host::load_cameras(at("cameras.json"));
+    ASSERT_TRUE(cameras.has_value());
+    for (std::size_t c = 0; c < 2; ++c)
+        EXPECT_LT(((*cameras)[c].centre_mm - (*truth)[c].centre_mm).norm(), 0.1);
+    ASSERT_TRUE(host::save_cameras(at("helmet.json"), std::span(entries).first(1), "one").has_value());
+    const test::VerbOutcome refused = run(all);
+    EXPECT_EQ(refused.exit_code, host::kExitInput);
+    EXPECT_TRUE(has(refused.err, "has 1 cameras and there are pictures of 2")) << refused.err;
+}
+
+TEST_F(CalibrateVerb, ASpoiledFileIsNamedAndTheRestIsUsed) {
+    copy_shots();
+    std::ofstream(folder.path() / "left" / "3.png", std::ios::trunc) << "no picture";
+    const test::VerbOutcome outcome = run(arguments());
+    EXPECT_EQ(outcome.exit_code, host::kExitOk) << outcome.err;
+    EXPECT_TRUE(has(outcome.out, "not used: ") && has(outcome.out, "left/3.png")) << outcome.out;
+    EXPECT_TRUE(has(outcome.out, "7/8")) << outcome.out;
+}
+
+TEST_F(CalibrateVerb, ABlurredPictureIsNamed) {
+    copy_shots();
+    const host::BoardSpec board = *host::parse_board(kBoard);
+    test::SeededRandom random(78);
+    const test::BoardScene scene(board, (*truth)[1]);
+    test::BoardLook look;
+    look.smear_px = 2.5;
+    const host::GreyImage image = scene.draw(test::waved_board(board, 1, 0.3, random)[0], look, random);
+    ASSERT_TRUE(host::write_grey_image(folder.path() / "right" / "9.png", image.view()).has_value());
+    const test::VerbOutcome outcome = run(arguments());
+    EXPECT_EQ(outcome.exit_code, host::kExitOk) << outcome.err;
+    EXPECT_TRUE(has(outcome.out, "right/9.png: blurred: edges 2")) << outcome.out;
+}
+
+TEST_F(CalibrateVerb, TheWrongBoardIsSaidWithItsName) {
+    copy_shots();
+    for (const char* board : {"charuco:7x5:12", "charuco:9x7:12:8:4x4_50", "circles:4x11:8"}) {
+        std::vector<std::string> all = arguments();
+        all[1] = board;
+        const test::VerbOutcome outcome = run(all);
+        EXPECT_EQ(outcome.exit_code, host::kExitInput) << board;
+        EXPECT_TRUE(has(outcome.err, std::string("--board ") + board)) << outcome.err;
+        EXPECT_FALSE(fs::exists(at("cameras.json")));
+    }
+}
+
+TEST_F(CalibrateVerb, TwoSizesTooFewAndNoPicturesAreErrors) {
+    copy_shots();
+    const host::GreyImage small{64, 48, std::vector<std::uint8_t>(64 * 48, 90)};
+    ASSERT_TRUE(host::write_grey_image(folder.path() / "left" / "small.png", small.view()).has_value());
+    test::VerbOutcome outcome = run(arguments());
+    EXPECT_EQ(outcome.exit_code, host::kExitInput);
+    EXPECT_TRUE(has(outcome.err, "small.png: is 64 x 48 px")) << outcome.err;
+    for (const char* name : {"small.png", "0.png", "1.png", "2.png"})
+        fs::remove(folder.path() / "left" / name);
+    outcome = run(arguments());
+    EXPECT_EQ(outcome.exit_code, host::kExitInput);
+    EXPECT_TRUE(has(outcome.err, "camera left: 5 of 5 pictures can be used and 6 are needed")) << outcome.err;
+    fs::remove_all(folder.path() / "left");
+    outcome = run(arguments());
+    EXPECT_EQ(outcome.exit_code, host::kExitInput);
+    EXPECT_TRUE(has(outcome.err, at("left"))) << outcome.err;
+}
+
+TEST_F(CalibrateVerb, MakesTheBoardAndRefusesWhatIsNone) {
+    const test::VerbOutcome made = run({"--board", "circles:4x11:8", "--make-board", at("board.png")});
+    EXPECT_EQ(made.exit_code, host::kExitOk) << made.err;
+    EXPECT_TRUE(has(made.out, "100 mm") || has(made.out, "100.0 mm")) << made.out;
+    EXPECT_TRUE(fs::exists(at("board.png")));
+    EXPECT_EQ(run({"--board", "chess:4x11:8", "--make-board", at("b.png")}).exit_code, host::kExitUsage);
+    EXPECT_EQ(run({"--board", kBoard}).exit_code, host::kExitUsage);
+    EXPECT_EQ(run({"--board", kBoard, "--images", at("x"), "--by-name", at("y"), "--out", "c"}).exit_code,
+              host::kExitUsage);
+    EXPECT_EQ(run({"--board", kBoard, "--make-board", at("no/board.png")}).exit_code, host::kExitOutput);
+}
+
+}  // namespace
