@@ -95,6 +95,14 @@ std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span
     return cut(runs, out, truncated, [&](int x, int y) { return (search.image.row(y)[x] ^ turn) > level; });
 }
 
+// Whether the middle of a component's box is part of it.
+bool holds_its_middle(const Component& component, std::span<const Run> runs) {
+    const int x = (component.left + component.right + 1) / 2;
+    const int y = (component.top + component.bottom + 1) / 2;
+    return std::any_of(runs.begin(), runs.end(),
+                       [&](const Run& run) { return run.y == y && run.begin <= x && x < run.end; });
+}
+
 // Whether no other part of the same larger component reaches into the window around this one; crumbs of
 // noise do not count.
 bool stands_alone(const Component& component, const Siblings& siblings) {
@@ -254,8 +262,8 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
     }
     Blob blob;
     QuickStart start;
-    const bool alone = stands_alone(component, siblings) &&
-                       frame_component(search.image, component, runs, workspace_.quick, start);
+    const bool alone = stands_alone(component, siblings) && holds_its_middle(component, runs) &&
+                       frame_component(search.image, component, start);
     if (!alone || !measure_quickly(search.image, search.side, start, config_.blob, workspace_.quick, blob)) {
         blob =
             measure_blob(search.image, search.side, component, runs, siblings, config_.blob, workspace_.blob);

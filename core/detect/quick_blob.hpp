@@ -13,7 +13,7 @@
 
 namespace rig {
 
-inline constexpr int kQuickMarginPx = 5;  // of surroundings on every side of the start
+inline constexpr int kQuickMarginPx = 3;  // of surroundings on every side of the start
 inline constexpr int kQuickWindowPx = 48;
 
 // Where a blob is about to be measured.
@@ -26,17 +26,13 @@ struct QuickStart {
 
 struct QuickWorkspace {
     BitRows blob{};
-    BitRows covered{};  // at mid contrast or deeper
-    BitRows dusky{};    // deep enough not to be background
     BitRows scratch{};
-    std::array<std::uint16_t, 256> histogram{};
 };
 
-// The window around a component, and its pixels in workspace.blob; false where it does not fit.
-[[nodiscard]] bool frame_component(const ImageView& image, const Component& component,
-                                   std::span<const Run> runs, QuickWorkspace& workspace, QuickStart& start);
+// The window around a component; false where it does not fit.
+[[nodiscard]] bool frame_component(const ImageView& image, const Component& component, QuickStart& start);
 
-// Measures the blob of workspace.blob, roughly drawn. False when this is not a normal case: measure_blob()
+// Measures the blob inside the window's margin. False when this is not a normal case: measure_blob()
 // then has to decide, and `blob` says nothing.
 [[nodiscard]] bool measure_quickly(const ImageView& image, Side side, const QuickStart& start,
                                    const BlobLimits& limits, QuickWorkspace& workspace, Blob& blob);

@@ -62,11 +62,28 @@ struct EightFloats {
     FourFloats high;
 };
 
-[[nodiscard]] inline EightFloats floats_of_lanes(PixelLanes lanes) {
+struct EightInts {
+    FourInts low;
+    FourInts high;
+};
+
+[[nodiscard]] inline EightInts ints_of_lanes(PixelLanes lanes) {
     const PixelLanes low = __builtin_shufflevector(lanes, lanes, 0, 0, 1, 1, 2, 2, 3, 3);
     const PixelLanes high = __builtin_shufflevector(lanes, lanes, 4, 4, 5, 5, 6, 6, 7, 7);
-    return {__builtin_convertvector(reinterpret_cast<FourInts>(low) >> 16, FourFloats),
-            __builtin_convertvector(reinterpret_cast<FourInts>(high) >> 16, FourFloats)};
+    return {reinterpret_cast<FourInts>(low) >> 16, reinterpret_cast<FourInts>(high) >> 16};
+}
+
+[[nodiscard]] inline EightFloats floats_of_lanes(PixelLanes lanes) {
+    const EightInts whole = ints_of_lanes(lanes);
+    return {__builtin_convertvector(whole.low, FourFloats), __builtin_convertvector(whole.high, FourFloats)};
+}
+
+// To nearest; |v| < 2^15.
+[[nodiscard]] inline PixelLanes rounded_lanes(const EightFloats& v) {
+    const auto nearest = [](FourFloats f) { return __builtin_convertvector(f + 32768.5F, FourInts) - 32768; };
+    const auto low = reinterpret_cast<PixelLanes>(nearest(v.low));
+    const auto high = reinterpret_cast<PixelLanes>(nearest(v.high));
+    return __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
 }
 
 [[nodiscard]] inline int sum_of_ints(FourInts v) {
