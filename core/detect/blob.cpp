@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/math.hpp"
+#include "core/detect/blob_shape.hpp"
 
 namespace rig {
 
@@ -20,15 +21,10 @@ constexpr int kMoatReach = 3;           // px
 constexpr int kOpenCover = 112;         // a moat pixel darker than this is no background
 constexpr int kCorePercent =
     30;  // of the blob's pixels are darker than its core: clear of noise, glints and edge
-constexpr double kDeepBadness = 0.25;   // of a marker that only shows at the deep outline
-constexpr double kAspectBadness = 0.3;  // of the flattest disc
-constexpr double kNoiseDeviationPx =
-    1.5;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
-constexpr double kSureSnr = 6.0;         // contrast / spread of the surroundings: less costs
-constexpr std::uint32_t kPeerAreas = 3;  // a sibling with a third of the blob's area is its equal
-constexpr int kMinRing = 12;             // pixels that can carry a plane
-constexpr int kRounds = 2;               // outline -> background -> outline
-constexpr int kFraction = 256;           // of a grey level: fixed point of the background plane
+constexpr double kDeepBadness = 0.25;  // of a marker that only shows at the deep outline
+constexpr int kMinRing = 12;           // pixels that can carry a plane
+constexpr int kRounds = 2;             // outline -> background -> outline
+constexpr int kFraction = 256;         // of a grey level: fixed point of the background plane
 
 // Grey level at column x, row y of the window: level + slope_x (x - centre_x) + slope_y (y - centre_y).
 struct Plane {
@@ -41,15 +37,6 @@ struct Plane {
     [[nodiscard]] double at(double x, double y) const {
         return level + slope_x * (x - centre_x) + slope_y * (y - centre_y);
     }
-};
-
-struct Moments {
-    double weight = 0.0;
-    double x = 0.0;
-    double y = 0.0;
-    double xx = 0.0;
-    double xy = 0.0;
-    double yy = 0.0;
 };
 
 template <class Visit>
@@ -356,7 +343,7 @@ bool redraw_blob(BlobWorkspace& w, int outline, Rejection& reason) {
 }
 
 // Weights of the soft threshold over the blob and one step around it; filled holes count as blob.
-Moments soft_moments(BlobWorkspace& w, int outline) {
+SoftMoments soft_moments(BlobWorkspace& w, int outline) {
     BitRows& region = w.scratch;
     region = w.blob;
     grow_square(region, w.height);
@@ -376,7 +363,7 @@ Moments soft_moments(BlobWorkspace& w, int outline) {
         n += rn, sx += rx, sxx += rxx, sy += std::int64_t{rn} * y;
         sxy += std::int64_t{rx} * y, syy += std::int64_t{rn} * y * y;
     }
-    Moments m;
+    SoftMoments m;
     if (n == 0) return m;
     const auto count = static_cast<double>(n);
     m.weight = count / (2 * kRamp);
@@ -390,7 +377,7 @@ Moments soft_moments(BlobWorkspace& w, int outline) {
 
 // Mean distance between the outline and the ellipse of equal moments, px: pixels on the wrong side per pixel
 // of outline.
-double outline_deviation_px(const BlobWorkspace& w, const Moments& m, double mean_radius_px) {
+double outline_deviation_px(const BlobWorkspace& w, const SoftMoments& m, double mean_radius_px) {
     const double determinant = m.xx * m.yy - m.xy * m.xy;
     if (determinant <= 0.0) return kBlobWindowPx;
     // Row by row the ellipse a dx^2 + b dx dy + c dy^2 <= 4 is one span.
@@ -423,43 +410,6 @@ double open_part(const BlobWorkspace& w) {
         ++total;
     });
     return total == 0 ? 1.0 : static_cast<double>(open) / total;
-}
-
-void judge(const BlobWorkspace& w, const Moments& m, const PlaneFit& fit, const BlobLimits& limits,
-           Blob& blob) {
-    const double mean = 0.5 * (m.xx + m.yy);
-    const double half = 0.5 * (m.xx - m.yy);
-    const double spread = sqrt(half * half + m.xy * m.xy);
-    blob.x_px = w.left + m.x;
-    blob.y_px = w.top + m.y;
-    blob.long_axis_px = 4.0 * sqrt(mean + spread);
-    blob.short_axis_px = 4.0 * sqrt(std::max(mean - spread, 1.0 / 64.0));
-    blob.diameter_px = 1.1283791670955126 * sqrt(m.weight);
-    const double radius = 0.5 * sqrt(blob.long_axis_px * blob.short_axis_px);
-    blob.deviation = outline_deviation_px(w, m, radius);
-    blob.open = open_part(w);
-    const double aspect = blob.long_axis_px / blob.short_axis_px;
-    const double noise = std::max(1.0, fit.rms) / blob.contrast;
-    const double deviation_limit =
-        limits.max_deviation_px + limits.max_deviation * radius + kNoiseDeviationPx * noise;
-    const double snr = 1.0 / noise;
-    blob.badness = blob.deviation / deviation_limit + blob.open / limits.max_open +
-                   kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) +
-                   std::max(0.0, kSureSnr - snr) / kSureSnr;
-    blob.rejection = Rejection::kNone;
-    if (blob.diameter_px < limits.min_diameter_px) {
-        blob.rejection = Rejection::kSmall;
-    } else if (blob.long_axis_px > limits.max_diameter_px) {
-        blob.rejection = Rejection::kLarge;
-    } else if (snr < 2.5) {
-        blob.rejection = Rejection::kFaint;
-    } else if (aspect > limits.max_aspect) {
-        blob.rejection = Rejection::kElongated;
-    } else if (blob.open > limits.max_open) {
-        blob.rejection = Rejection::kOpen;
-    } else if (blob.deviation > deviation_limit) {
-        blob.rejection = Rejection::kIrregular;
-    }
 }
 
 bool touches_border(const ImageView& image, const BlobWorkspace& w) {
@@ -503,12 +453,15 @@ void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, c
         return;
     }
     draw_surroundings(w);
-    const Moments moments = soft_moments(w, outline);
+    const SoftMoments moments = soft_moments(w, outline);
     if (moments.weight <= 0.0) {
         blob.rejection = Rejection::kSmall;
         return;
     }
-    judge(w, moments, fit, limits, blob);
+    set_axes(moments, w.left, w.top, blob);
+    blob.deviation = outline_deviation_px(w, moments, mean_radius_px(blob));
+    blob.open = open_part(w);
+    judge_shape(fit.rms, limits, blob);
 }
 
 }  // namespace

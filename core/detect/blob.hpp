@@ -73,6 +73,8 @@ struct BlobWorkspace {
     int height = 0;
 };
 
+inline constexpr std::uint32_t kPeerAreas = 3;  // a sibling with a third of the blob's area is its equal
+
 // What was cut out of the same larger component, the blob itself among it: markers that touch share the
 // pixels between them. Runs of each are in `grouped`. Both empty for a blob that stands alone.
 struct Siblings {

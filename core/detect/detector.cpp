@@ -63,6 +63,7 @@ bool in_range(double value, double low, double high) {
 void add_reports(DetectorReport& total, const DetectorReport& side) {
     total.runs += side.runs;
     total.candidates += side.candidates;
+    total.slow += side.slow;
     for (std::size_t i = 0; i < total.rejected.size(); ++i) total.rejected[i] += side.rejected[i];
     total.runs_full |= side.runs_full;
     total.blobs_full |= side.blobs_full;
@@ -92,6 +93,28 @@ std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span
     }
     const int level = shallowest + static_cast<int>(depth * (deepest - shallowest));
     return cut(runs, out, truncated, [&](int x, int y) { return (search.image.row(y)[x] ^ turn) > level; });
+}
+
+// Whether the middle of a component's box is part of it.
+bool holds_its_middle(const Component& component, std::span<const Run> runs) {
+    const int x = (component.left + component.right + 1) / 2;
+    const int y = (component.top + component.bottom + 1) / 2;
+    return std::any_of(runs.begin(), runs.end(),
+                       [&](const Run& run) { return run.y == y && run.begin <= x && x < run.end; });
+}
+
+// Whether no other part of the same larger component reaches into the window around this one; crumbs of
+// noise do not count.
+bool stands_alone(const Component& component, const Siblings& siblings) {
+    for (const Component& other : siblings.components) {
+        const bool apart =
+            other.right + kQuickMarginPx < component.left || other.left > component.right + kQuickMarginPx ||
+            other.bottom + kQuickMarginPx < component.top || other.top > component.bottom + kQuickMarginPx;
+        const bool itself =
+            other.left == component.left && other.top == component.top && other.first == component.first;
+        if (!apart && !itself && other.area_px * kPeerAreas >= component.area_px) return false;
+    }
+    return true;
 }
 
 }  // namespace
@@ -237,8 +260,15 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         reject(Rejection::kLarge);
         return false;
     }
-    const Blob blob =
-        measure_blob(search.image, search.side, component, runs, siblings, config_.blob, workspace_.blob);
+    Blob blob;
+    QuickStart start;
+    const bool alone = stands_alone(component, siblings) && holds_its_middle(component, runs) &&
+                       frame_component(search.image, component, start);
+    if (!alone || !measure_quickly(search.image, search.side, start, config_.blob, workspace_.quick, blob)) {
+        blob =
+            measure_blob(search.image, search.side, component, runs, siblings, config_.blob, workspace_.blob);
+        ++result.report.slow;
+    }
     ++result.report.candidates;
     if (blob.rejection != Rejection::kNone) {
         reject(blob.rejection);

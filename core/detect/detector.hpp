@@ -12,6 +12,7 @@
 #include "core/base/result.hpp"
 #include "core/detect/blob.hpp"
 #include "core/detect/observation.hpp"
+#include "core/detect/quick_blob.hpp"
 #include "core/image/view.hpp"
 #include "core/limits.hpp"
 
@@ -41,6 +42,7 @@ struct DetectorReport {
     std::uint32_t runs = 0;
     std::uint32_t candidates = 0;                                                       // blobs measured
     std::array<std::uint32_t, static_cast<std::size_t>(Rejection::kCount)> rejected{};  // by Rejection
+    std::uint32_t slow = 0;  // of the candidates: measured by measure_blob()
     std::uint32_t low_score = 0;
     std::uint32_t left_out = 0;  // good blobs beyond kMaxObservations, the lowest scored
     bool runs_full = false;      // a capacity was reached: runs, blobs, observations
@@ -111,6 +113,7 @@ class Detector {
         std::array<SplitStorage, kSplitLevels> split{};
         BoundedVector<std::uint16_t, kMaxBlobs> failed;
         BlobWorkspace blob;
+        QuickWorkspace quick;
         std::array<SideResult, 2> sides;
     };
 

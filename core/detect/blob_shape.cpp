@@ -1,0 +1,59 @@
+#include "core/detect/blob_shape.hpp"
+
+#include <algorithm>
+
+#include "core/base/math.hpp"
+
+namespace rig {
+
+namespace {
+
+constexpr double kAspectBadness = 0.3;  // of the flattest disc
+constexpr double kNoiseDeviationPx =
+    1.5;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
+constexpr double kSureSnr = 6.0;   // contrast / spread of the surroundings: less costs
+constexpr double kLeastSnr = 2.5;  // below: no telling it from noise
+
+}  // namespace
+
+void set_axes(const SoftMoments& m, int left, int top, Blob& blob) {
+    const double mean = 0.5 * (m.xx + m.yy);
+    const double half = 0.5 * (m.xx - m.yy);
+    const double spread = sqrt(half * half + m.xy * m.xy);
+    blob.x_px = left + m.x;
+    blob.y_px = top + m.y;
+    blob.long_axis_px = 4.0 * sqrt(mean + spread);
+    blob.short_axis_px = 4.0 * sqrt(std::max(mean - spread, 1.0 / 64.0));
+    blob.diameter_px = 1.1283791670955126 * sqrt(m.weight);
+}
+
+double mean_radius_px(const Blob& blob) {
+    return 0.5 * sqrt(blob.long_axis_px * blob.short_axis_px);
+}
+
+void judge_shape(double noise, const BlobLimits& limits, Blob& blob) {
+    const double aspect = blob.long_axis_px / blob.short_axis_px;
+    const double noise_share = std::max(1.0, noise) / blob.contrast;
+    const double deviation_limit = limits.max_deviation_px + limits.max_deviation * mean_radius_px(blob) +
+                                   kNoiseDeviationPx * noise_share;
+    const double snr = 1.0 / noise_share;
+    blob.badness = blob.deviation / deviation_limit + blob.open / limits.max_open +
+                   kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) +
+                   std::max(0.0, kSureSnr - snr) / kSureSnr;
+    blob.rejection = Rejection::kNone;
+    if (blob.diameter_px < limits.min_diameter_px) {
+        blob.rejection = Rejection::kSmall;
+    } else if (blob.long_axis_px > limits.max_diameter_px) {
+        blob.rejection = Rejection::kLarge;
+    } else if (snr < kLeastSnr) {
+        blob.rejection = Rejection::kFaint;
+    } else if (aspect > limits.max_aspect) {
+        blob.rejection = Rejection::kElongated;
+    } else if (blob.open > limits.max_open) {
+        blob.rejection = Rejection::kOpen;
+    } else if (blob.deviation > deviation_limit) {
+        blob.rejection = Rejection::kIrregular;
+    }
+}
+
+}  // namespace rig

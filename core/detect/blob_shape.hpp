@@ -1,0 +1,27 @@
+// What a blob's weights say of its shape, and whether a marker looks like that.
+#pragma once
+
+#include "core/detect/blob.hpp"
+
+namespace rig {
+
+// Of a soft-threshold mask: its weight in pixels, centre and central second moments, px.
+struct SoftMoments {
+    double weight = 0.0;
+    double x = 0.0;
+    double y = 0.0;
+    double xx = 0.0;
+    double xy = 0.0;
+    double yy = 0.0;
+};
+
+// Centre, axes and diameter of the ellipse of equal moments; (left, top) is where the moments' window begins.
+void set_axes(const SoftMoments& moments, int left, int top, Blob& blob);
+
+[[nodiscard]] double mean_radius_px(const Blob& blob);
+
+// Sets badness and rejection of a blob whose axes, contrast, deviation and openness are known; noise: rms of
+// the surroundings about their plane, grey levels.
+void judge_shape(double noise, const BlobLimits& limits, Blob& blob);
+
+}  // namespace rig

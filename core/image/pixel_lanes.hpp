@@ -1,0 +1,106 @@
+// Eight pixels at a time as 16-bit lanes, four as floats. The width is fixed, whatever the machine has, and
+// every operation stands alone in its lane or adds integers, so the bits are those of a plain loop.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+namespace rig {
+
+inline constexpr int kPixelLanes = 8;
+
+using PixelLanes = std::int16_t __attribute__((vector_size(16)));
+using FourFloats = float __attribute__((vector_size(16)));
+using FourInts = std::int32_t __attribute__((vector_size(16)));
+
+using SixteenBytes = std::uint8_t __attribute__((vector_size(16)));
+using EightSigned = std::int8_t __attribute__((vector_size(8)));
+
+[[nodiscard]] inline PixelLanes all_lanes(int value) {
+    return PixelLanes{} + static_cast<std::int16_t>(value);
+}
+
+[[nodiscard]] inline FourFloats all_four(float value) {
+    return FourFloats{} + value;
+}
+
+// `first`, `first` + 1, ... in the eight lanes.
+[[nodiscard]] inline PixelLanes counting_lanes(int first) {
+    return PixelLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<std::int16_t>(first);
+}
+
+// Spelt as interleaving with zeros, which every machine has as one instruction; a conversion of the vector
+// would be taken apart into its lanes.
+[[nodiscard]] inline PixelLanes load_pixels(const std::uint8_t* from, std::uint8_t turn) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, from, sizeof(word));
+    using Words = std::uint64_t __attribute__((vector_size(16)));
+    const auto bytes = reinterpret_cast<SixteenBytes>(Words{word, 0});
+    const SixteenBytes wide = __builtin_shufflevector(bytes, SixteenBytes{}, 0, 16, 1, 17, 2, 18, 3, 19, 4,
+                                                      20, 5, 21, 6, 22, 7, 23);
+    return reinterpret_cast<PixelLanes>(wide) ^ static_cast<std::int16_t>(turn);
+}
+
+// -1 in the lanes whose bit is set, lowest bit first.
+[[nodiscard]] inline PixelLanes lanes_of_bits(std::uint64_t bits) {
+    const PixelLanes weights{1, 2, 4, 8, 16, 32, 64, 128};
+    return (all_lanes(static_cast<int>(bits & 0xFFU)) & weights) == weights;
+}
+
+// One bit for each lane of -1, none for those of 0.
+[[nodiscard]] inline std::uint64_t bits_of_lanes(PixelLanes mask) {
+    const EightSigned bytes = __builtin_convertvector(mask, EightSigned);
+    std::uint64_t word = 0;
+    std::memcpy(&word, &bytes, sizeof(word));
+    return ((word & 0x0101010101010101ULL) * 0x0102040810204080ULL) >> 56;
+}
+
+struct EightFloats {
+    FourFloats low;
+    FourFloats high;
+};
+
+struct EightInts {
+    FourInts low;
+    FourInts high;
+};
+
+[[nodiscard]] inline EightInts ints_of_lanes(PixelLanes lanes) {
+    const PixelLanes low = __builtin_shufflevector(lanes, lanes, 0, 0, 1, 1, 2, 2, 3, 3);
+    const PixelLanes high = __builtin_shufflevector(lanes, lanes, 4, 4, 5, 5, 6, 6, 7, 7);
+    return {reinterpret_cast<FourInts>(low) >> 16, reinterpret_cast<FourInts>(high) >> 16};
+}
+
+[[nodiscard]] inline EightFloats floats_of_lanes(PixelLanes lanes) {
+    const EightInts whole = ints_of_lanes(lanes);
+    return {__builtin_convertvector(whole.low, FourFloats), __builtin_convertvector(whole.high, FourFloats)};
+}
+
+// To nearest; |v| < 2^15.
+[[nodiscard]] inline PixelLanes rounded_lanes(const EightFloats& v) {
+    const auto nearest = [](FourFloats f) { return __builtin_convertvector(f + 32768.5F, FourInts) - 32768; };
+    const auto low = reinterpret_cast<PixelLanes>(nearest(v.low));
+    const auto high = reinterpret_cast<PixelLanes>(nearest(v.high));
+    return __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
+}
+
+[[nodiscard]] inline int sum_of_ints(FourInts v) {
+    const FourInts pairs = v + __builtin_shufflevector(v, v, 2, 3, 0, 1);
+    return pairs[0] + pairs[1];
+}
+
+[[nodiscard]] inline int sum_of_lanes(PixelLanes lanes) {
+    const auto both = reinterpret_cast<FourInts>(lanes);
+    return sum_of_ints((both << 16 >> 16) + (both >> 16));
+}
+
+// Sum of a[i] b[i], each product in 32 bits.
+[[nodiscard]] inline int sum_of_products(PixelLanes a, PixelLanes b) {
+    const auto x = reinterpret_cast<FourInts>(a);
+    const auto y = reinterpret_cast<FourInts>(b);
+    return sum_of_ints((x << 16 >> 16) * (y << 16 >> 16) + (x >> 16) * (y >> 16));
+}
+
+}  // namespace rig
