@@ -538,8 +538,9 @@ bool frame_component(const ImageView& image, const Component& component, QuickSt
     start.width = component.right - component.left + 1 + 2 * kQuickMarginPx;
     start.height = component.bottom - component.top + 1 + 2 * kQuickMarginPx;
     const int read = (start.width + kPixelLanes - 1) / kPixelLanes * kPixelLanes;
-    if (start.left < 0 || start.top < 0 || start.width > kQuickWindowPx || start.height > kQuickWindowPx ||
-        start.left + read > image.width_px || start.top + start.height > image.height_px) {
+    if (start.width < kPixelLanes || start.left < 0 || start.top < 0 || start.width > kQuickWindowPx ||
+        start.height > kQuickWindowPx || start.left + read > image.width_px ||
+        start.top + start.height > image.height_px) {
         return false;
     }
     return true;

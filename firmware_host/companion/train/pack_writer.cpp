@@ -201,8 +201,8 @@ std::vector<fb::Section> table_of(const std::vector<SectionData>& sections, std:
     return table;
 }
 
-// An older core refuses marker sets; a still older one would take any kernel for the Gaussian and never fall
-// back.
+// The oldest core that takes this pack's numbers for what they are: one before 2 would take any kernel for
+// the Gaussian and never fall back, one before 3 any lens for a polynomial one, and refuse marker sets.
 std::uint16_t oldest_core_for(const SolvePack& pack) {
     constexpr std::uint16_t kMarkerSetAndLensAbi = 3;
     constexpr std::uint16_t kRbfKernelAbi = 2;
