@@ -1,0 +1,72 @@
+// Eight lanes against one pixel after the other.
+#include "core/image/pixel_lanes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "tests/support/random.hpp"
+
+namespace {
+
+using namespace rig;
+
+PixelLanes random_lanes(test::SeededRandom& random, double reach) {
+    PixelLanes lanes;
+    for (int i = 0; i < kPixelLanes; ++i) lanes[i] = static_cast<std::int16_t>(random.uniform(-reach, reach));
+    return lanes;
+}
+
+TEST(PixelLanes, PixelsAreLoadedInOrderAndTurned) {
+    const std::array<std::uint8_t, 8> bytes{0, 1, 2, 127, 128, 200, 254, 255};
+    for (const std::uint8_t turn : {std::uint8_t{0}, std::uint8_t{255}}) {
+        const PixelLanes lanes = load_pixels(bytes.data(), turn);
+        for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(lanes[static_cast<int>(i)], bytes[i] ^ turn);
+    }
+}
+
+TEST(PixelLanes, BitsBecomeMasksAndComeBack) {
+    for (std::uint64_t bits = 0; bits < 256; ++bits) {
+        const PixelLanes mask = lanes_of_bits(bits | 0xABCD00U);  // only the lowest eight count
+        for (int i = 0; i < kPixelLanes; ++i) EXPECT_EQ(mask[i], (bits >> i & 1U) != 0 ? -1 : 0);
+        EXPECT_EQ(bits_of_lanes(mask), bits);
+    }
+}
+
+TEST(PixelLanes, NumbersAreKeptOnTheWayToIntsAndFloats) {
+    test::SeededRandom random(3);
+    for (int round = 0; round < 100; ++round) {
+        const PixelLanes lanes = random_lanes(random, 32767.0);
+        const EightInts ints = ints_of_lanes(lanes);
+        const EightFloats floats = floats_of_lanes(lanes);
+        for (int i = 0; i < 4; ++i) {
+            EXPECT_EQ(ints.low[i], lanes[i]);
+            EXPECT_EQ(ints.high[i], lanes[i + 4]);
+            EXPECT_EQ(floats.low[i], static_cast<float>(lanes[i]));
+            EXPECT_EQ(floats.high[i], static_cast<float>(lanes[i + 4]));
+        }
+        const PixelLanes back = rounded_lanes({floats.low + 0.25F, floats.high - 0.25F});
+        for (int i = 0; i < kPixelLanes; ++i) EXPECT_EQ(back[i], lanes[i]);
+    }
+}
+
+TEST(PixelLanes, SumsAreThoseOfWideIntegers) {
+    test::SeededRandom random(4);
+    for (int round = 0; round < 100; ++round) {
+        const PixelLanes a = random_lanes(random, 32767.0);
+        const PixelLanes b = random_lanes(random, 4000.0);
+        int sum = 0;
+        int products = 0;
+        for (int i = 0; i < kPixelLanes; ++i) sum += a[i], products += int{a[i]} * b[i];
+        EXPECT_EQ(sum_of_lanes(a), sum);
+        EXPECT_EQ(sum_of_products(a, b), products);
+    }
+}
+
+TEST(PixelLanes, CountingStartsWhereAsked) {
+    const PixelLanes lanes = counting_lanes(-3);
+    for (int i = 0; i < kPixelLanes; ++i) EXPECT_EQ(lanes[i], i - 3);
+}
+
+}  // namespace
