@@ -3,33 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "tests/support/dense_solve.hpp"
 
 namespace rig::test {
 
 namespace {
-
-// Gauss elimination with column pivoting; the system is a principal part of a positive definite matrix.
-std::vector<long double> solve_dense(std::vector<long double> a, std::vector<long double> b) {
-    const std::size_t n = b.size();
-    for (std::size_t c = 0; c < n; ++c) {
-        std::size_t pivot = c;
-        for (std::size_t r = c + 1; r < n; ++r) {
-            if (std::fabs(a[r * n + c]) > std::fabs(a[pivot * n + c])) pivot = r;
-        }
-        for (std::size_t k = 0; k < n; ++k) std::swap(a[c * n + k], a[pivot * n + k]);
-        std::swap(b[c], b[pivot]);
-        for (std::size_t r = c + 1; r < n; ++r) {
-            const long double factor = a[r * n + c] / a[c * n + c];
-            for (std::size_t k = c; k < n; ++k) a[r * n + k] -= factor * a[c * n + k];
-            b[r] -= factor * b[c];
-        }
-    }
-    for (std::size_t c = n; c-- > 0;) {
-        for (std::size_t k = c + 1; k < n; ++k) b[c] -= a[c * n + k] * b[k];
-        b[c] /= a[c * n + c];
-    }
-    return b;
-}
 
 // The minimum with the variables of `pattern` (base 3: free, low, high) fixed; false when it is not feasible.
 bool minimum_of_pattern(const ReferenceQp& p, std::size_t pattern, std::vector<long double>& w) {
@@ -56,10 +36,10 @@ bool minimum_of_pattern(const ReferenceQp& p, std::size_t pattern, std::vector<l
         }
         b.push_back(right);
     }
-    const std::vector<long double> x = solve_dense(a, b);
+    if (!solve_dense(std::move(a), b, 0.0L)) return false;  // a part of a positive definite matrix: it does
     for (std::size_t k = 0; k < free.size(); ++k) {
-        w[free[k]] = x[k];
-        if (!(x[k] >= p.low[free[k]] && x[k] <= p.high[free[k]])) return false;
+        w[free[k]] = b[k];
+        if (!(b[k] >= p.low[free[k]] && b[k] <= p.high[free[k]])) return false;
     }
     return true;
 }

@@ -4,11 +4,15 @@
 #include <cmath>
 #include <limits>
 
+#include "tests/support/dense_solve.hpp"
+
 namespace rig::test {
 
 namespace {
 
 using Numbers = std::vector<long double>;
+
+constexpr long double kLeastPivot = 1e-15L;  // under it a pivot is nothing but rounding
 
 Numbers gram_of(const ReferenceSimplexQp& p) {
     Numbers gram(p.count * p.count, 0.0L);
@@ -19,32 +23,6 @@ Numbers gram_of(const ReferenceSimplexQp& p) {
         }
     }
     return gram;
-}
-
-// Gauss elimination with row pivoting; false when a pivot is nothing but rounding.
-bool solve_dense(Numbers a, Numbers& b) {
-    const std::size_t n = b.size();
-    long double largest = 0.0L;
-    for (const long double x : a) largest = std::max(largest, std::fabs(x));
-    for (std::size_t c = 0; c < n; ++c) {
-        std::size_t pivot = c;
-        for (std::size_t r = c + 1; r < n; ++r) {
-            if (std::fabs(a[r * n + c]) > std::fabs(a[pivot * n + c])) pivot = r;
-        }
-        if (std::fabs(a[pivot * n + c]) <= 1e-15L * largest) return false;
-        for (std::size_t k = 0; k < n; ++k) std::swap(a[c * n + k], a[pivot * n + k]);
-        std::swap(b[c], b[pivot]);
-        for (std::size_t r = c + 1; r < n; ++r) {
-            const long double factor = a[r * n + c] / a[c * n + c];
-            for (std::size_t k = c; k < n; ++k) a[r * n + k] -= factor * a[c * n + k];
-            b[r] -= factor * b[c];
-        }
-    }
-    for (std::size_t c = n; c-- > 0;) {
-        for (std::size_t k = c + 1; k < n; ++k) b[c] -= a[c * n + k] * b[k];
-        b[c] /= a[c * n + c];
-    }
-    return true;
 }
 
 // The minimum over the affine span of the examples in `pattern`; false where it leaves the simplex.
@@ -62,7 +40,7 @@ bool minimum_of_pattern(const Numbers& gram, const Numbers& linear, std::size_t 
         a[i * (k + 1) + k] = a[k * (k + 1) + i] = 1.0L;
         b[i] = linear[used[i]];
     }
-    if (!solve_dense(std::move(a), b)) return false;
+    if (!solve_dense(std::move(a), b, kLeastPivot)) return false;
     c.assign(n, 0.0L);
     for (std::size_t i = 0; i < k; ++i) {
         if (b[i] < 0.0L) return false;

@@ -225,6 +225,21 @@ Scene lattice_scene(double diameter_px, double max_aspect, bool bright, std::uin
     return scene;
 }
 
+Scene single_dot_scene(int side_px, double skin, const SceneDot& dot) {
+    Scene scene;
+    scene.width_px = side_px;
+    scene.height_px = side_px;
+    scene.light = {.skin = skin,
+                   .gradient = 0.0,
+                   .vignetting = 0.0,
+                   .texture = 0.0,
+                   .blur_px = 0.8,
+                   .read_noise = 0.0,
+                   .shot_noise = 0.0};
+    scene.dots.push_back(dot);
+    return scene;
+}
+
 Scene touching_scene(double diameter_px, bool bright, std::uint64_t seed) {
     Scene scene = lattice_scene(diameter_px, 1.2, bright, seed);
     SeededRandom random(seed + 1);

@@ -63,6 +63,9 @@ struct Picture {
 // Dots of one make on a jittered lattice, turned away by up to 1 / `max_aspect`, none at the border.
 [[nodiscard]] Scene lattice_scene(double diameter_px, double max_aspect, bool bright, std::uint64_t seed);
 
+// One dot on even skin, blurred by the lens, without noise.
+[[nodiscard]] Scene single_dot_scene(int side_px, double skin, const SceneDot& dot);
+
 // Pairs of dots whose outlines touch or nearly do, among single ones.
 [[nodiscard]] Scene touching_scene(double diameter_px, bool bright, std::uint64_t seed);
 

@@ -46,19 +46,9 @@ Blob measure(const std::vector<std::uint8_t>& pixels, Side side, int level, cons
 }
 
 test::Scene one_dot(double x, double y, double long_px, double short_px) {
-    test::Scene scene;
-    scene.width_px = kSide;
-    scene.height_px = kSide;
-    scene.light = {.skin = 120.0,
-                   .gradient = 0.0,
-                   .vignetting = 0.0,
-                   .texture = 0.0,
-                   .blur_px = 0.8,
-                   .read_noise = 0.0,
-                   .shot_noise = 0.0};
-    scene.dots.push_back(
+    return test::single_dot_scene(
+        kSide, 120.0,
         {.x_px = x, .y_px = y, .long_px = long_px, .short_px = short_px, .angle_rad = 0.6, .paint = 0.2});
-    return scene;
 }
 
 TEST(Blob, ADiscIsMeasuredToAFewHundredthsWhateverTheThreshold) {

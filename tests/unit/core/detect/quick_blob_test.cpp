@@ -17,19 +17,9 @@ using namespace rig;
 constexpr int kSide = 80;
 
 test::Scene one_dot(double x, double y, double long_px, double short_px, double paint) {
-    test::Scene scene;
-    scene.width_px = kSide;
-    scene.height_px = kSide;
-    scene.light = {.skin = paint < 1.0 ? 120.0 : 45.0,
-                   .gradient = 0.0,
-                   .vignetting = 0.0,
-                   .texture = 0.0,
-                   .blur_px = 0.8,
-                   .read_noise = 0.0,
-                   .shot_noise = 0.0};
-    scene.dots.push_back(
-        {.x_px = x, .y_px = y, .long_px = long_px, .short_px = short_px, .angle_rad = 0.6, .paint = paint});
-    return scene;
+    const test::SceneDot dot{
+        .x_px = x, .y_px = y, .long_px = long_px, .short_px = short_px, .angle_rad = 0.6, .paint = paint};
+    return test::single_dot_scene(kSide, paint < 1.0 ? 120.0 : 45.0, dot);
 }
 
 Component box(int left, int top, int right, int bottom) {

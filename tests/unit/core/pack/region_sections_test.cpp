@@ -12,27 +12,18 @@
 #include "firmware_host/pack_file/sha256.hpp"
 #include "tests/support/pack_samples/aligned_bytes.hpp"
 #include "tests/support/pack_samples/sample_pack.hpp"
+#include "tests/unit/core/pack/section_checks.hpp"
 
 namespace rig {
 namespace {
 
 using host::write_pack;
 using test::AlignedBytes;
+using test::error_of;
+using test::expect_equal;
 using test::SamplePack;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-
-PackError error_of(const SolvePack& pack) {
-    const AlignedBytes bytes(write_pack(pack, {}, sha256));
-    const auto opened = open_pack(bytes.span(), sha256);
-    return opened ? PackError::kCount : opened.error();
-}
-
-template <class T>
-void expect_equal(std::span<const T> got, const std::vector<T>& wanted) {
-    ASSERT_EQ(got.size(), wanted.size());
-    EXPECT_EQ(std::memcmp(got.data(), wanted.data(), got.size_bytes()), 0);
-}
 
 TEST(RegionSections, GiveBackWhatWasWritten) {
     for (const SolverKind solver : {SolverKind::kKeyShapes, SolverKind::kExamples}) {
