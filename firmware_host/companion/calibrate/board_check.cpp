@@ -1,34 +1,25 @@
 #include "firmware_host/companion/calibrate/board_check.hpp"
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "core/geometry/triangulation.hpp"
+#include "firmware_host/companion/fit/similarity.hpp"
 
 namespace rig::host {
 
 namespace {
 
-// Sum of squared distances after the best rigid motion (Kabsch 1976).
-double rigid_misfit_mm2(const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
-    Vec3 mean_from = Vec3::Zero();
-    Vec3 mean_to = Vec3::Zero();
-    for (std::size_t i = 0; i < from.size(); ++i) {
-        mean_from += from[i] / static_cast<double>(from.size());
-        mean_to += to[i] / static_cast<double>(from.size());
-    }
-    Mat3 spread = Mat3::Zero();
-    for (std::size_t i = 0; i < from.size(); ++i)
-        spread += (to[i] - mean_to) * (from[i] - mean_from).transpose();
-    const Eigen::JacobiSVD<Mat3> svd(spread, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Mat3 sign = Mat3::Identity();
-    sign(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-    const Mat3 turn = svd.matrixU() * sign * svd.matrixV().transpose();
+// Sum of squared distances after the best rigid motion; nothing where the points lie on a line.
+std::optional<double> rigid_misfit_mm2(const std::vector<Vec3>& from, const std::vector<Vec3>& to) {
+    SimilarityFit fit;
+    for (std::size_t i = 0; i < from.size(); ++i) fit.add(from[i], to[i]);
+    const std::optional<Similarity> motion = fit.solve(/*scaled=*/false);
+    if (!motion) return std::nullopt;
     double sum = 0.0;
-    for (std::size_t i = 0; i < from.size(); ++i)
-        sum += (to[i] - mean_to - turn * (from[i] - mean_from)).squaredNorm();
+    for (std::size_t i = 0; i < from.size(); ++i) sum += (to[i] - motion->apply(from[i])).squaredNorm();
     return sum;
 }
 
@@ -55,7 +46,9 @@ TriangulationCheck check_triangulation(const BundleProblem& problem) {
             found.push_back(fit.position_mm);
         }
         if (flat.size() < 4) continue;
-        sum += rigid_misfit_mm2(flat, found);
+        const std::optional<double> misfit_mm2 = rigid_misfit_mm2(flat, found);
+        if (!misfit_mm2) continue;
+        sum += *misfit_mm2;
         check.points += flat.size();
     }
     if (check.points > 0) check.rms_mm = std::sqrt(sum / static_cast<double>(check.points));

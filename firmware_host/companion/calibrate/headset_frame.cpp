@@ -1,11 +1,12 @@
 #include "firmware_host/companion/calibrate/headset_frame.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cmath>
+#include <optional>
 
 #include "core/base/check.hpp"
 #include "core/base/math.hpp"
+#include "firmware_host/companion/fit/similarity.hpp"
 
 namespace rig::host {
 
@@ -32,28 +33,17 @@ std::vector<Vec3> marks_of(std::span<const CameraModel> cameras) {
     return marks;
 }
 
-Vec3 mean_of(const std::vector<Vec3>& points) {
-    Vec3 sum = Vec3::Zero();
-    for (const Vec3& point : points) sum += point;
-    return sum / static_cast<double>(points.size());
-}
-
 }  // namespace
 
 double align_to_reference(std::vector<CameraModel>& cameras, std::span<const CameraModel> reference) {
     RIG_CHECK(cameras.size() == reference.size() && !cameras.empty());
     const std::vector<Vec3> from = marks_of(cameras);
     const std::vector<Vec3> to = marks_of(reference);
-    const Vec3 mean_from = mean_of(from);
-    const Vec3 mean_to = mean_of(to);
-    Mat3 spread = Mat3::Zero();
-    for (std::size_t i = 0; i < from.size(); ++i)
-        spread += (to[i] - mean_to) * (from[i] - mean_from).transpose();
-    const Eigen::JacobiSVD<Mat3> svd(spread, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Mat3 sign = Mat3::Identity();
-    sign(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-    const Mat3 turn = svd.matrixU() * sign * svd.matrixV().transpose();
-    move_rig(cameras, turn, mean_to - turn * mean_from);
+    SimilarityFit fit;
+    for (std::size_t i = 0; i < from.size(); ++i) fit.add(from[i], to[i]);
+    const std::optional<Similarity> motion = fit.solve(/*scaled=*/false);
+    RIG_CHECK(motion);  // a camera's three axes lie on no line
+    move_rig(cameras, motion->rotation, motion->translation_mm);
     double sum = 0.0;
     for (std::size_t c = 0; c < cameras.size(); ++c)
         sum += (cameras[c].centre_mm - reference[c].centre_mm).squaredNorm();
