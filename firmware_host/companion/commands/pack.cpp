@@ -9,6 +9,7 @@
 
 #include "firmware_host/companion/commands/console.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
+#include "firmware_host/companion/train/camera_file.hpp"
 #include "firmware_host/pack_file/opened_pack.hpp"
 
 namespace rig::host {
@@ -63,36 +64,6 @@ double column_mm(const SolvePack& pack, std::size_t i) {
         sum += x * x;
     }
     return std::sqrt(sum);
-}
-
-const char* lens_name(const CameraModel& camera) {
-    return camera.lens == LensModel::kFisheye ? "fisheye" : "rational";
-}
-
-json camera_json(const CameraModel& camera) {
-    json rotation = json::array();
-    for (int r = 0; r < 3; ++r) {
-        rotation.push_back({camera.camera_from_headset(r, 0), camera.camera_from_headset(r, 1),
-                            camera.camera_from_headset(r, 2)});
-    }
-    return {{"width", camera.width_px},
-            {"height", camera.height_px},
-            {"fx_px", camera.fx_px},
-            {"fy_px", camera.fy_px},
-            {"cx", camera.cx_px},
-            {"cy", camera.cy_px},
-            {"k1", camera.k1},
-            {"k2", camera.k2},
-            {"p1", camera.p1},
-            {"p2", camera.p2},
-            {"k3", camera.k3},
-            {"k4", camera.k4},
-            {"k5", camera.k5},
-            {"k6", camera.k6},
-            {"lens", lens_name(camera)},
-            {"row_time_us", camera.row_time_us},
-            {"R", rotation},
-            {"centre_mm", {camera.centre_mm[0], camera.centre_mm[1], camera.centre_mm[2]}}};
 }
 
 json shape_json(const SolvePack& pack, std::size_t i) {
@@ -158,7 +129,7 @@ json pack_json(const OpenedPack& opened) {
                                    {"sha256", hex(section.hash)}});
     }
     for (std::size_t c = 0; c < pack.camera_count; ++c)
-        out["cameras"].push_back(camera_json(pack.cameras[c]));
+        out["cameras"].push_back(json(camera_json(pack.cameras[c])));
     for (std::size_t r = 0; r < pack.region_count; ++r)
         out["regions"].push_back(region_json(pack, pack.regions[r]));
     for (std::size_t f = 0; f < pack.marker_set_count; ++f) {
@@ -216,9 +187,10 @@ void print_tables(const OpenedPack& opened) {
         fmt::print(
             "  {}  {} x {} px  {}  f {:.2f} {:.2f}  c {:.2f} {:.2f}  k {:.4g} {:.4g} {:.4g} {:.4g} {:.4g} "
             "{:.4g}  p {:.4g} {:.4g}  row {:.3g} us  at {:.1f} {:.1f} {:.1f} mm\n",
-            c, camera.width_px, camera.height_px, lens_name(camera), camera.fx_px, camera.fy_px, camera.cx_px,
-            camera.cy_px, camera.k1, camera.k2, camera.k3, camera.k4, camera.k5, camera.k6, camera.p1,
-            camera.p2, camera.row_time_us, camera.centre_mm[0], camera.centre_mm[1], camera.centre_mm[2]);
+            c, camera.width_px, camera.height_px, lens_name(camera.lens), camera.fx_px, camera.fy_px,
+            camera.cx_px, camera.cy_px, camera.k1, camera.k2, camera.k3, camera.k4, camera.k5, camera.k6,
+            camera.p1, camera.p2, camera.row_time_us, camera.centre_mm[0], camera.centre_mm[1],
+            camera.centre_mm[2]);
     }
     for (std::size_t r = 0; r < pack.region_count; ++r) {
         const RegionModel& region = pack.regions[r];

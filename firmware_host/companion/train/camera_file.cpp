@@ -110,34 +110,12 @@ std::string letter_of(const json& entry, std::size_t index) {
 }
 
 nlohmann::ordered_json entry_of(const CameraEntry& entry) {
-    const CameraModel& camera = entry.model;
-    nlohmann::ordered_json rotation = nlohmann::ordered_json::array();
-    for (int r = 0; r < 3; ++r) {
-        const auto row = camera.camera_from_headset.row(r);
-        rotation.push_back({row[0], row[1], row[2]});
-    }
-    return {{"camera", entry.name},
-            {"width", camera.width_px},
-            {"height", camera.height_px},
-            {"lens", camera.lens == LensModel::kFisheye ? "fisheye" : "rational"},
-            {"fx_px", camera.fx_px},
-            {"fy_px", camera.fy_px},
-            {"cx", camera.cx_px},
-            {"cy", camera.cy_px},
-            {"k1", camera.k1},
-            {"k2", camera.k2},
-            {"p1", camera.p1},
-            {"p2", camera.p2},
-            {"k3", camera.k3},
-            {"k4", camera.k4},
-            {"k5", camera.k5},
-            {"k6", camera.k6},
-            {"row_time_us", camera.row_time_us},
-            {"R", rotation},
-            {"centre_mm", {camera.centre_mm[0], camera.centre_mm[1], camera.centre_mm[2]}},
-            {"rms_px", entry.rms_px},
-            {"views", entry.view_count},
-            {"points", entry.point_count}};
+    nlohmann::ordered_json out{{"camera", entry.name}};
+    out.update(camera_json(entry.model));
+    out["rms_px"] = entry.rms_px;
+    out["views"] = entry.view_count;
+    out["points"] = entry.point_count;
+    return out;
 }
 
 // The entries that are cameras, one for each letter.
@@ -158,6 +136,36 @@ std::vector<const json*> camera_entries(const json& file) {
 }
 
 }  // namespace
+
+const char* lens_name(LensModel lens) {
+    return lens == LensModel::kFisheye ? "fisheye" : "rational";
+}
+
+nlohmann::ordered_json camera_json(const CameraModel& camera) {
+    nlohmann::ordered_json rotation = nlohmann::ordered_json::array();
+    for (int r = 0; r < 3; ++r) {
+        const auto row = camera.camera_from_headset.row(r);
+        rotation.push_back({row[0], row[1], row[2]});
+    }
+    return {{"width", camera.width_px},
+            {"height", camera.height_px},
+            {"lens", lens_name(camera.lens)},
+            {"fx_px", camera.fx_px},
+            {"fy_px", camera.fy_px},
+            {"cx", camera.cx_px},
+            {"cy", camera.cy_px},
+            {"k1", camera.k1},
+            {"k2", camera.k2},
+            {"p1", camera.p1},
+            {"p2", camera.p2},
+            {"k3", camera.k3},
+            {"k4", camera.k4},
+            {"k5", camera.k5},
+            {"k6", camera.k6},
+            {"row_time_us", camera.row_time_us},
+            {"R", rotation},
+            {"centre_mm", {camera.centre_mm[0], camera.centre_mm[1], camera.centre_mm[2]}}};
+}
 
 Result<std::vector<CameraModel>, FileError> parse_cameras(std::string_view text,
                                                           const std::filesystem::path& name) {

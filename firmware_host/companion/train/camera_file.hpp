@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -23,6 +24,11 @@ namespace rig::host {
 // The same from text; `name` stands for the file in errors.
 [[nodiscard]] Result<std::vector<CameraModel>, FileError> parse_cameras(std::string_view text,
                                                                         const std::filesystem::path& name);
+
+// The members of an entry that describe the camera itself, in the file's order.
+[[nodiscard]] nlohmann::ordered_json camera_json(const CameraModel& camera);
+
+[[nodiscard]] const char* lens_name(LensModel lens);
 
 // What calibration knows of one camera.
 struct CameraEntry {
