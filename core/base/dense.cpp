@@ -74,22 +74,30 @@ void sort_falling(double* values, double* vectors, std::size_t n, std::size_t st
     }
 }
 
-}  // namespace
-
-double dot(const double* a, const double* b, std::size_t n) {
+template <typename Left>
+double sum_products(const Left* a, const double* b, std::size_t n) {
     double s0 = 0.0;
     double s1 = 0.0;
     double s2 = 0.0;
     double s3 = 0.0;
     std::size_t i = 0;
     for (; i + 4 <= n; i += 4) {
-        s0 += a[i] * b[i];
-        s1 += a[i + 1] * b[i + 1];
-        s2 += a[i + 2] * b[i + 2];
-        s3 += a[i + 3] * b[i + 3];
+        s0 += static_cast<double>(a[i]) * b[i];
+        s1 += static_cast<double>(a[i + 1]) * b[i + 1];
+        s2 += static_cast<double>(a[i + 2]) * b[i + 2];
+        s3 += static_cast<double>(a[i + 3]) * b[i + 3];
     }
-    for (; i < n; ++i) s0 += a[i] * b[i];
+    for (; i < n; ++i) s0 += static_cast<double>(a[i]) * b[i];
     return (s0 + s1) + (s2 + s3);
+}
+
+}  // namespace
+
+double dot(const double* a, const double* b, std::size_t n) {
+    return sum_products(a, b, n);
+}
+double dot(const float* a, const double* b, std::size_t n) {
+    return sum_products(a, b, n);
 }
 
 void add_scaled(double* y, double alpha, const double* x, std::size_t n) {

@@ -9,6 +9,7 @@ namespace rig {
 // Sum of a[i] b[i], in four interleaved partial sums added as ((s0 + s1) + (s2 + s3)): the same bits
 // everywhere.
 [[nodiscard]] double dot(const double* a, const double* b, std::size_t n);
+[[nodiscard]] double dot(const float* a, const double* b, std::size_t n);
 
 // y += alpha x
 void add_scaled(double* y, double alpha, const double* x, std::size_t n);

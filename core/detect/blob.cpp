@@ -9,22 +9,21 @@ namespace rig {
 
 namespace {
 
-constexpr int kMargin = 8;           // px of surroundings on every side of the component
-constexpr int kFull = 256;           // cover of a pixel that is all blob
-constexpr int kHalf = kFull / 2;     // where the outline is drawn,
-constexpr int kDeep = 176;           // or here where shadow touches the marker
-constexpr int kRamp = 64;            // soft threshold: weight 0 to 1 from outline - kRamp to outline + kRamp
-constexpr float kLeastShare = 0.4F;  // of the light at the centre that a pixel's background may have,
+constexpr int kMargin = 8;  // px of surroundings on every side of the component
+constexpr int kFull = 256;  // cover of a pixel that is all blob
+constexpr int kHalf = static_cast<int>(kFull * kHalfOutline);
+constexpr int kDeep = static_cast<int>(kFull * kDeepOutline);
+constexpr int kRamp = static_cast<int>(kFull * kSoftRamp);
+constexpr float kLeastShare = 0.4F;     // of the light at the centre that a pixel's background may have,
 constexpr float kGreatestShare = 2.5F;  // so that a bad plane cannot run away
 constexpr int kRedrawReach = 2;         // px that a redrawn outline may lie outside the old one
 constexpr int kMoatReach = 3;           // px
-constexpr int kOpenCover = 112;         // a moat pixel darker than this is no background
+constexpr int kOpen = static_cast<int>(kFull * kOpenCover);
 constexpr int kCorePercent =
     30;  // of the blob's pixels are darker than its core: clear of noise, glints and edge
-constexpr double kDeepBadness = 0.25;  // of a marker that only shows at the deep outline
-constexpr int kMinRing = 12;           // pixels that can carry a plane
-constexpr int kRounds = 2;             // outline -> background -> outline
-constexpr int kFraction = 256;         // of a grey level: fixed point of the background plane
+constexpr int kMinRing = 12;    // pixels that can carry a plane
+constexpr int kRounds = 2;      // outline -> background -> outline
+constexpr int kFraction = 256;  // of a grey level: fixed point of the background plane
 
 // Grey level at column x, row y of the window: level + slope_x (x - centre_x) + slope_y (y - centre_y).
 struct Plane {
@@ -406,7 +405,7 @@ double open_part(const BlobWorkspace& w) {
     int open = 0;
     int total = 0;
     for_each_bit(w.moat, w.height, [&](int x, int y) {
-        open += cover_at(w, x, y) > kOpenCover ? 1 : 0;
+        open += cover_at(w, x, y) > kOpen ? 1 : 0;
         ++total;
     });
     return total == 0 ? 1.0 : static_cast<double>(open) / total;
@@ -481,10 +480,8 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
     blob.rejection = outline_at_mid_contrast(side, component, limits, w, fit, blob);
     if (blob.rejection != Rejection::kNone) return blob;
     measure_outline(image, fit, kHalf, limits, w, blob);
-    const bool shadowed = blob.rejection == Rejection::kOpen || blob.rejection == Rejection::kIrregular ||
-                          blob.rejection == Rejection::kElongated;
     Rejection reason = Rejection::kNone;
-    if (shadowed && redraw_blob(w, kDeep, reason)) {
+    if (looks_shadowed(blob.rejection) && redraw_blob(w, kDeep, reason)) {
         measure_outline(image, fit, kDeep, limits, w, blob);
         blob.badness += kDeepBadness;
     }

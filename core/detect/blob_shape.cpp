@@ -56,4 +56,9 @@ void judge_shape(double noise, const BlobLimits& limits, Blob& blob) {
     }
 }
 
+bool looks_shadowed(Rejection rejection) {
+    return rejection == Rejection::kOpen || rejection == Rejection::kIrregular ||
+           rejection == Rejection::kElongated;
+}
+
 }  // namespace rig

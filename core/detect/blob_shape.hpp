@@ -24,4 +24,16 @@ void set_axes(const SoftMoments& moments, int left, int top, Blob& blob);
 // the surroundings about their plane, grey levels.
 void judge_shape(double noise, const BlobLimits& limits, Blob& blob);
 
+// Parts of the contrast: where an outline is drawn, or where it is drawn when shadow touches the marker; and
+// below what a pixel of the surroundings is background.
+inline constexpr double kHalfOutline = 0.5;
+inline constexpr double kDeepOutline = 0.6875;
+inline constexpr double kOpenCover = 0.4375;
+inline constexpr double kSoftRamp =
+    0.25;  // weights rise from 0 to 1 from this much before an outline to after it
+inline constexpr double kDeepBadness = 0.25;  // of a marker that only shows at the deep outline
+
+// Refused for what shadow does to an outline: worth another look at the deep one.
+[[nodiscard]] bool looks_shadowed(Rejection rejection);
+
 }  // namespace rig

@@ -63,7 +63,6 @@ bool in_range(double value, double low, double high) {
 void add_reports(DetectorReport& total, const DetectorReport& side) {
     total.runs += side.runs;
     total.candidates += side.candidates;
-    total.slow += side.slow;
     for (std::size_t i = 0; i < total.rejected.size(); ++i) total.rejected[i] += side.rejected[i];
     total.runs_full |= side.runs_full;
     total.blobs_full |= side.blobs_full;
@@ -267,7 +266,6 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
     if (!alone || !measure_quickly(search.image, search.side, start, config_.blob, workspace_.quick, blob)) {
         blob =
             measure_blob(search.image, search.side, component, runs, siblings, config_.blob, workspace_.blob);
-        ++result.report.slow;
     }
     ++result.report.candidates;
     if (blob.rejection != Rejection::kNone) {

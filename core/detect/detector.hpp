@@ -42,7 +42,6 @@ struct DetectorReport {
     std::uint32_t runs = 0;
     std::uint32_t candidates = 0;                                                       // blobs measured
     std::array<std::uint32_t, static_cast<std::size_t>(Rejection::kCount)> rejected{};  // by Rejection
-    std::uint32_t slow = 0;  // of the candidates: measured by measure_blob()
     std::uint32_t low_score = 0;
     std::uint32_t left_out = 0;  // good blobs beyond kMaxObservations, the lowest scored
     bool runs_full = false;      // a capacity was reached: runs, blobs, observations

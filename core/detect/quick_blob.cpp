@@ -14,24 +14,19 @@ namespace rig {
 namespace {
 
 constexpr int kChunks = kQuickWindowPx / kPixelLanes;
-constexpr int kRimPx = 3;         // the window's rim carries the background
-constexpr int kRimSamples = 12;   // whose median is the first guess at it
-constexpr int kCoreSide = 4;      // px: the middle of the blob, whose
-constexpr int kCoreRank = 4;      // fifth darkest pixel is as dark as it gets, clear of noise and glints
-constexpr int kClip = 48;         // grey levels about the guess: 16 bits hold the sums of 48 rows of them
-constexpr int kCoarse = 16;       // fixed point of a distance from the background,
-constexpr int kFine = 32;         // and of an outline
-constexpr int kReach = 1;         // px that the outline may lie outside the start
-constexpr double kHalf = 0.5;     // outlines, parts of the contrast: where it is drawn,
-constexpr double kDeep = 0.6875;  // or here where shadow touches the marker
-constexpr double kOpen = 0.4375;  // a moat pixel darker than this is no background
-constexpr double kRamp = 0.25;    // soft threshold: weight 0 to 1 from outline - kRamp to outline + kRamp
+constexpr int kRimPx = 3;        // the window's rim carries the background
+constexpr int kRimSamples = 12;  // whose median is the first guess at it
+constexpr int kCoreSide = 4;     // px: the middle of the blob, whose
+constexpr int kCoreRank = 4;     // fifth darkest pixel is as dark as it gets, clear of noise and glints
+constexpr int kClip = 48;        // grey levels about the guess: 16 bits hold the sums of 48 rows of them
+constexpr int kCoarse = 16;      // fixed point of a distance from the background,
+constexpr int kFine = 32;        // and of an outline
+constexpr int kReach = 1;        // px that the outline may lie outside the start
 constexpr double kFullWeight = 255.0;
-constexpr double kDeepBadness = 0.25;  // of a marker that only shows at the deep outline
-constexpr double kSure = 0.8;          // badness of a marker above which it is measured again, slowly
-constexpr double kSteepest = 0.8;      // change of the light from the window's centre to its corner
-constexpr double kSpread = 0.2;        // of the contrast, that the skin around may stray from its plane
-constexpr double kCleanRim = 0.97;     // of the rim is skin: nothing reaches the blob from outside
+constexpr double kSure = 0.8;       // badness of a marker above which it is measured again, slowly
+constexpr double kSteepest = 0.8;   // change of the light from the window's centre to its corner
+constexpr double kSpread = 0.2;     // of the contrast, that the skin around may stray from its plane
+constexpr double kCleanRim = 0.97;  // of the rim is skin: nothing reaches the blob from outside
 
 // Over the pixels that count: x and y from the window's centre, t = grey level - guess.
 struct RimSums {
@@ -361,11 +356,12 @@ bool QuickMeasure::draw(double outline, double contrast) {
 // Weights of the soft threshold over the blob and one step around it. They are in grey levels, larger where
 // there is more light; gather() takes that out.
 SoftMoments QuickMeasure::moments(double outline, double contrast) const {
-    const double scale = static_cast<double>(static_cast<int>(kFullWeight / (2.0 * kRamp * contrast)) + 1);
-    const Slope low = level_at(outline - kRamp, scale, contrast);
-    const double per_light = light_sign_ * 2.0 * kRamp * contrast / light();
-    const Slope full(2.0 * kRamp * contrast, plane_.slope_x * per_light, plane_.slope_y * per_light, scale,
-                     centre_x_, chunks_);
+    const double scale =
+        static_cast<double>(static_cast<int>(kFullWeight / (2.0 * kSoftRamp * contrast)) + 1);
+    const Slope low = level_at(outline - kSoftRamp, scale, contrast);
+    const double per_light = light_sign_ * 2.0 * kSoftRamp * contrast / light();
+    const Slope full(2.0 * kSoftRamp * contrast, plane_.slope_x * per_light, plane_.slope_y * per_light,
+                     scale, centre_x_, chunks_);
     std::array<WeightLanes, kChunks> lanes{};
     std::uint64_t above = 0;
     std::uint64_t here = 0;
@@ -389,7 +385,7 @@ SoftMoments QuickMeasure::moments(double outline, double contrast) const {
                                                        lanes_of_bits(region >> (chunk * kPixelLanes)));
         }
     }
-    return gather(lanes, last_ + 1, scale * 2.0 * kRamp * contrast);
+    return gather(lanes, last_ + 1, scale * 2.0 * kSoftRamp * contrast);
 }
 
 // `bottom`: the last row that was added; full: the weight of a whole pixel at the window's centre.
@@ -482,7 +478,7 @@ double QuickMeasure::open_part(double contrast) const {
     const BitRows inner = moat;
     grow_cross(moat, s_.height);
     grow_square(moat, s_.height);
-    const Slope level = level_at(kOpen, kFine, contrast);
+    const Slope level = level_at(kOpenCover, kFine, contrast);
     int total = 0;
     int open = 0;
     for (int y = 0; y < s_.height; ++y) {
@@ -519,12 +515,10 @@ bool QuickMeasure::run(Blob& blob) {
         blob.rejection = Rejection::kFaint;
         return true;
     }
-    if (!draw(kHalf, blob.contrast)) return false;
-    judge(kHalf, blob);
-    const bool shadowed = blob.rejection == Rejection::kOpen || blob.rejection == Rejection::kIrregular ||
-                          blob.rejection == Rejection::kElongated;
-    if (shadowed && draw(kDeep, blob.contrast)) {
-        judge(kDeep, blob);
+    if (!draw(kHalfOutline, blob.contrast)) return false;
+    judge(kHalfOutline, blob);
+    if (looks_shadowed(blob.rejection) && draw(kDeepOutline, blob.contrast)) {
+        judge(kDeepOutline, blob);
         blob.badness += kDeepBadness;
     }
     return blob.rejection != Rejection::kNone || blob.badness < kSure;

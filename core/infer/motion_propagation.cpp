@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/check.hpp"
+#include "core/base/dense.hpp"
 
 namespace rig {
 
@@ -38,23 +39,6 @@ int first_set(std::span<const MarkerSetModel> sets, std::span<const bool> known,
     return chosen;
 }
 
-// As dot(), of floats with doubles.
-double projection(const float* mode, const double* offset, std::size_t n) {
-    double s0 = 0.0;
-    double s1 = 0.0;
-    double s2 = 0.0;
-    double s3 = 0.0;
-    std::size_t i = 0;
-    for (; i + 4 <= n; i += 4) {
-        s0 += static_cast<double>(mode[i]) * offset[i];
-        s1 += static_cast<double>(mode[i + 1]) * offset[i + 1];
-        s2 += static_cast<double>(mode[i + 2]) * offset[i + 2];
-        s3 += static_cast<double>(mode[i + 3]) * offset[i + 3];
-    }
-    for (; i < n; ++i) s0 += static_cast<double>(mode[i]) * offset[i];
-    return (s0 + s1) + (s2 + s3);
-}
-
 // Proj(dV, F) and the update of dV with it.
 void project(const MarkerSetModel& set, std::uint16_t most_modes, PropagationWorkspace& w,
              std::span<Vec3> displacement_mm) {
@@ -66,7 +50,7 @@ void project(const MarkerSetModel& set, std::uint16_t most_modes, PropagationWor
     }
     for (std::size_t j = 0; j < std::min(set.mode_count, most_modes); ++j) {
         const float* mode = set.modes.data() + j * rows;
-        const double along = projection(mode, w.offset_mm.data(), rows);
+        const double along = dot(mode, w.offset_mm.data(), rows);
         for (std::size_t r = 0; r < rows; ++r) w.projected_mm[r] += along * static_cast<double>(mode[r]);
     }
     for (std::size_t r = 0; r < rows; ++r)

@@ -111,11 +111,6 @@ class PosteriorFollower {
     ConfidenceWorkspace& w_;
 };
 
-float from_variances(double posterior, double prior) {
-    const double left = std::sqrt(posterior / prior);
-    return is_finite(left) ? static_cast<float>(std::clamp(1.0 - left, 0.0, 1.0)) : 0.0F;
-}
-
 }  // namespace
 
 void follow_confidence(const SolvePack& pack, const NormalTables<double>& tables,
@@ -131,7 +126,7 @@ void read_confidence(const SolvePack& pack, const ConfidenceState& state, std::s
     for (std::size_t i = 0; i < n; ++i) {
         const auto sigma = static_cast<double>(pack.prior_sigma[i]);
         confidence[i] =
-            state.valid ? from_variances(state.posterior[i * row_stride(n) + i], sigma * sigma) : 0.0F;
+            state.valid ? confidence_of(state.posterior[i * row_stride(n) + i], sigma * sigma) : 0.0F;
     }
 }
 
@@ -145,7 +140,7 @@ float region_confidence(std::span<const float> prior_sigma, std::span<const floa
         posterior += left * left;
         prior += sigma * sigma;
     }
-    return prior > 0.0 ? from_variances(posterior, prior) : 0.0F;
+    return prior > 0.0 ? confidence_of(posterior, prior) : 0.0F;
 }
 
 }  // namespace rig

@@ -8,11 +8,14 @@
 // a square to P, so that none of its diagonal can fall, not even by rounding. In double.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 
 #include "core/base/linalg.hpp"
+#include "core/base/math.hpp"
 #include "core/limits.hpp"
 #include "core/pack/solve_pack.hpp"
 #include "core/solve/normal_equations.hpp"
@@ -36,6 +39,12 @@ struct ConfidenceWorkspace {
 // changed cost 6 N^2 operations each, more than those N^3 in all.
 void follow_confidence(const SolvePack& pack, const NormalTables<double>& tables,
                        std::span<const Mat3> weights, ConfidenceState& state, ConfidenceWorkspace& workspace);
+
+// 1 - sqrt(posterior / prior) of variances, 0..1; 0 where that is no number.
+[[nodiscard]] inline float confidence_of(double posterior, double prior) {
+    const double left = std::sqrt(posterior / prior);
+    return is_finite(left) ? static_cast<float>(std::clamp(1.0 - left, 0.0, 1.0)) : 0.0F;
+}
 
 // confidence [N], 0..1; all zero when P is no covariance (V was not finite).
 void read_confidence(const SolvePack& pack, const ConfidenceState& state, std::span<float> confidence);

@@ -5,6 +5,7 @@
 
 #include "core/base/check.hpp"
 #include "core/base/math.hpp"
+#include "core/solve/confidence.hpp"
 
 namespace rig {
 
@@ -153,7 +154,7 @@ void add_shapes(const SolvePack& pack, const RegionModel& region, const Regional
         prior += share * sigma * sigma;
         posterior += share * unknown * unknown;
     }
-    report.confidence = prior > 0.0 ? static_cast<float>(1.0 - std::sqrt(posterior / prior)) : 0.0F;
+    report.confidence = prior > 0.0 ? confidence_of(posterior, prior) : 0.0F;
 }
 
 }  // namespace
