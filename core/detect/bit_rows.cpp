@@ -38,6 +38,7 @@ bool sweep(BitRows& seed, const BitRows& allowed, int height, bool down) {
     std::uint64_t changed = 0;
     for (int i = 0; i < height; ++i) {
         const auto y = static_cast<std::size_t>(down ? i : height - 1 - i);
+        if ((seed[y] | previous) == 0) continue;
         std::uint64_t row = seed[y] | (kDiagonal ? previous | previous << 1 | previous >> 1 : previous);
         row &= allowed[y];
         for (std::uint64_t wider = row;; row = wider) {
@@ -61,6 +62,11 @@ void flood(BitRows& seed, const BitRows& allowed, int height) {
 }
 
 void fill_holes(BitRows& rows, int width, int height) {
+    std::uint64_t split = 0;  // rows that are one run each have none
+    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
+        split |= rows[y] & (rows[y] + (rows[y] & (~rows[y] + 1)));
+    }
+    if (split == 0) return;
     const std::uint64_t mask = row_mask(width);
     BitRows outside{};
     BitRows reached{};

@@ -1,9 +1,11 @@
 #include "core/detect/blob.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 #include "core/base/math.hpp"
 #include "core/detect/blob_shape.hpp"
+#include "core/image/pixel_lanes.hpp"
 
 namespace rig {
 
@@ -274,25 +276,38 @@ void compute_cover(BlobWorkspace& w, Side side, const Plane& plane, double depth
     const auto scale = static_cast<float>(kFull / depth);
     const auto slope = static_cast<float>(plane.slope_x);
     const Box box = box_around(w, kRedrawReach + kMoatReach);
+    const auto bounded = [](FourFloats v, float least, float most) {
+        v = v > all_four(least) ? v : all_four(least);
+        return v < all_four(most) ? v : all_four(most);
+    };
+    const auto cover_of = [&](FourFloats level, FourFloats value) {
+        const FourFloats share = bounded((level - black) * to_share, kLeastShare, kGreatestShare);
+        return bounded((level - value) * scale / share, -256.0F, 512.0F);
+    };
+    const int first = box.left / kPixelLanes * kPixelLanes;
     for (int y = box.top; y < box.bottom; ++y) {
         const std::uint8_t* values = w.values[static_cast<std::size_t>(y)].data();
         std::int16_t* cover = w.cover[static_cast<std::size_t>(y)].data();
         const auto row_level = static_cast<float>(plane.at(0.0, y));
-        for (int x = box.left; x < box.right; ++x) {
-            const float level = row_level + slope * static_cast<float>(x);
-            const float share = std::clamp((level - black) * to_share, kLeastShare, kGreatestShare);
-            const float c = (level - static_cast<float>(values[x])) * scale / share;
-            cover[x] = static_cast<std::int16_t>(static_cast<int>(std::clamp(c, -256.0F, 512.0F)));
+        for (int x = first; x < box.right; x += kPixelLanes) {
+            const EightFloats at = floats_of_lanes(counting_lanes(x));
+            const EightFloats value = floats_of_lanes(load_pixels(values + x, 0));
+            const PixelLanes lanes = truncated_lanes({cover_of(row_level + slope * at.low, value.low),
+                                                      cover_of(row_level + slope * at.high, value.high)});
+            std::memcpy(cover + x, &lanes, sizeof(lanes));
         }
     }
 }
 
-// Pixels near the old blob whose cover reaches `outline`. Cover is stale outside the box, and cut away there.
+// Pixels near the old blob whose cover reaches `outline`; inside it, when that is the half outline already:
+// cover is known so far around the blob that was found, and no farther.
 void mark_covered(const BlobWorkspace& w, int outline, BitRows& covered) {
     const Box box = box_around(w, kRedrawReach);
     covered = w.blob;
-    grow_square(covered, w.height);
-    grow_cross(covered, w.height);
+    if (outline == kHalf) {
+        grow_square(covered, w.height);
+        grow_cross(covered, w.height);
+    }
     for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) covered[y] &= ~w.foreign[y];
     for (auto y = static_cast<std::size_t>(box.top); y < static_cast<std::size_t>(box.bottom); ++y) {
         std::uint64_t bits = 0;

@@ -39,6 +39,12 @@ struct BlobLimits {
     double max_open = 0.22;          // part of the moat that is not background
 };
 
+// The least pixels a disc of the least diameter shows above mid contrast, with a margin for blur.
+[[nodiscard]] constexpr std::uint32_t least_area_px(const BlobLimits& limits) {
+    const double area = 0.5 * 0.785398 * limits.min_diameter_px * limits.min_diameter_px;
+    return area < 2.0 ? 2U : static_cast<std::uint32_t>(area);
+}
+
 struct Blob {
     double x_px = 0.0;
     double y_px = 0.0;

@@ -10,39 +10,45 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-std::uint32_t root_of(std::span<std::uint32_t> parents, std::uint32_t run) {
-    while (parents[run] != run) {
-        parents[run] = parents[parents[run]];
-        run = parents[run];
-    }
+std::uint32_t root_of(const std::uint32_t* parents, std::uint32_t run) {
+    while (parents[run] != run) run = parents[run];
     return run;
 }
 
 // The smaller number becomes the root, so a component is named by its first run whatever the order of the
 // unions.
-void unite(std::span<std::uint32_t> parents, std::uint32_t a, std::uint32_t b) {
-    const std::uint32_t root_a = root_of(parents, a);
-    const std::uint32_t root_b = root_of(parents, b);
-    if (root_a < root_b) {
-        parents[root_b] = root_a;
-    } else {
-        parents[root_a] = root_b;
-    }
+std::uint32_t unite(std::uint32_t* parents, std::uint32_t a, std::uint32_t b) {
+    const std::uint32_t least = a < b ? a : b;
+    parents[a < b ? b : a] = least;
+    return least;
 }
 
-void unite_rows(std::span<const Run> runs, std::span<std::uint32_t> parents) {
-    std::uint32_t above = 0;      // first run of the row above that can still touch
-    std::uint32_t row_begin = 0;  // of the current run's row
-    for (std::uint32_t i = 0; i < runs.size(); ++i) {
-        parents[i] = i;
-        if (i > 0 && runs[i].y != runs[i - 1].y) {
-            above = row_begin;
-            row_begin = i;
+// Most runs touch one run of the row above and take its root; only a second one makes a union.
+void unite_rows(const Run* runs, std::uint32_t total, std::uint32_t* parents) {
+    std::uint32_t above = 0;  // runs of the row above that can still touch: from here
+    std::uint32_t above_end = 0;
+    std::uint32_t i = 0;
+    while (i < total) {
+        const std::uint32_t row = i;
+        const std::uint16_t y = runs[i].y;
+        if (above < above_end && runs[above].y + 1 != y) above = above_end;
+        for (; i < total && runs[i].y == y; ++i) {
+            const std::uint16_t begin = runs[i].begin;
+            const std::uint16_t end = runs[i].end;
+            while (above < above_end && runs[above].end < begin) ++above;  // equal touches diagonally
+            std::uint32_t root = i;
+            for (std::uint32_t k = above; k < above_end && runs[k].begin <= end; ++k) {
+                const std::uint32_t other = root_of(parents, parents[k]);
+                if (root == i) {
+                    root = other;
+                } else if (other != root) {
+                    root = unite(parents, root, other);
+                }
+            }
+            parents[i] = root;
         }
-        if (row_begin == 0 || runs[above].y + 1 != runs[i].y) continue;
-        while (above < row_begin && runs[above].end < runs[i].begin) ++above;  // equal touches diagonally
-        for (std::uint32_t k = above; k < row_begin && runs[k].begin <= runs[i].end; ++k)
-            unite(parents, k, i);
+        above = row;
+        above_end = i;
     }
 }
 
@@ -53,6 +59,21 @@ void widen(Component& component, const Run& run) {
     ++component.count;
 }
 
+// A new component's, or kNone.
+std::uint32_t number_of(const Run& first, std::uint32_t area_px, const ComponentLimits& limits,
+                        std::span<Component> components, ComponentCounts& counts) {
+    if (area_px < limits.min_area_px) {
+        ++counts.small;
+        return kNone;
+    }
+    if (counts.components == components.size()) {
+        ++counts.dropped;
+        return kNone;
+    }
+    components[counts.components] = {0, 0, area_px, first.begin, first.y, 0, first.y};
+    return static_cast<std::uint32_t>(counts.components++);
+}
+
 }  // namespace
 
 ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits,
@@ -60,33 +81,25 @@ ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits
     const std::size_t total = runs.size();
     RIG_CHECK(storage.parents.size() >= total && storage.areas.size() >= total &&
               storage.grouped.size() >= total);
-    unite_rows(runs, storage.parents);
-    std::fill_n(storage.areas.begin(), total, 0U);
+    std::uint32_t* const parents = storage.parents.data();
+    std::uint32_t* const areas = storage.areas.data();
+    unite_rows(runs.data(), static_cast<std::uint32_t>(total), parents);
     for (std::uint32_t i = 0; i < total; ++i) {
-        const std::uint32_t root = root_of(storage.parents, i);
-        storage.parents[i] = root;
-        storage.areas[root] += static_cast<std::uint32_t>(runs[i].end - runs[i].begin);
+        const std::uint32_t root = parents[parents[i]];  // parents come first, so the parent's is a root
+        parents[i] = root;
+        const auto length = static_cast<std::uint32_t>(runs[i].end - runs[i].begin);
+        areas[i] = root == i ? length : 0;
+        if (root != i) areas[root] += length;
     }
 
     // Roots come before their members, so one pass numbers the components; areas[] of a root turns into its
     // number.
     ComponentCounts counts;
     for (std::uint32_t i = 0; i < total; ++i) {
-        const std::uint32_t root = storage.parents[i];
-        if (root == i) {
-            const std::uint32_t area = storage.areas[i];
-            const bool small = area < limits.min_area_px;
-            const bool full = !small && counts.components == storage.components.size();
-            counts.small += small ? 1 : 0;
-            counts.dropped += full ? 1 : 0;
-            storage.areas[i] = kNone;
-            if (!small && !full) {
-                storage.areas[i] = static_cast<std::uint32_t>(counts.components);
-                storage.components[counts.components++] = {0,         0, area,     runs[i].begin,
-                                                           runs[i].y, 0, runs[i].y};
-            }
-        }
-        const std::uint32_t number = storage.areas[root];
+        const std::uint32_t root = parents[i];
+        if (root == i) areas[i] = number_of(runs[i], areas[i], limits, storage.components, counts);
+        const std::uint32_t number = areas[root];
+        parents[i] = number;
         if (number != kNone) widen(storage.components[number], runs[i]);
     }
 
@@ -97,7 +110,7 @@ ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits
         storage.components[c].count = 0;
     }
     for (std::uint32_t i = 0; i < total; ++i) {
-        const std::uint32_t number = storage.areas[storage.parents[i]];
+        const std::uint32_t number = parents[i];
         if (number == kNone) continue;
         Component& component = storage.components[number];
         storage.grouped[component.first + component.count++] = runs[i];

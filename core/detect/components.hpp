@@ -20,6 +20,11 @@ struct Component {
     std::uint16_t bottom = 0;
 };
 
+[[nodiscard]] inline std::span<const Run> members_of(const Component& component,
+                                                     std::span<const Run> grouped) {
+    return grouped.subspan(component.first, component.count);
+}
+
 struct ComponentLimits {
     std::uint32_t min_area_px = 1;
 };

@@ -10,6 +10,7 @@ namespace rig {
 
 namespace {
 
+constexpr int kLumaRows = 4;    // every so manieth row is enough for the mean
 constexpr int kCorePixels = 3;  // beyond one and a half thresholds
 constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
                                                            0.75};  // of a component's own range of grey
@@ -18,21 +19,6 @@ constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual 
 constexpr double kSureBadness = 0.7;      // below: good enough to say what the markers of this image are like
 constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
 constexpr double kHopelessBadness = 1.5;  // score 0
-
-// The least pixels a disc of the least diameter shows above mid contrast, with a margin for blur.
-std::uint32_t least_area(const BlobLimits& limits) {
-    const double area = 0.5 * 0.785398 * limits.min_diameter_px * limits.min_diameter_px;
-    return area < 2.0 ? 2U : static_cast<std::uint32_t>(area);
-}
-
-std::span<const Run> members_of(const Component& component, std::span<const Run> grouped) {
-    return grouped.subspan(component.first, component.count);
-}
-
-const std::uint8_t* levels_of(const BlockGrid& thresholds, int y) {
-    return &thresholds
-                .values[static_cast<std::size_t>(y) / kBlockPx * static_cast<std::size_t>(thresholds.width)];
-}
 
 // The parts of `runs` for which inside(x, y) holds, as runs.
 template <class Inside>
@@ -60,20 +46,12 @@ bool in_range(double value, double low, double high) {
     return value >= low && value <= high;  // false for NaN
 }
 
-void add_reports(DetectorReport& total, const DetectorReport& side) {
-    total.runs += side.runs;
-    total.candidates += side.candidates;
-    for (std::size_t i = 0; i < total.rejected.size(); ++i) total.rejected[i] += side.rejected[i];
-    total.runs_full |= side.runs_full;
-    total.blobs_full |= side.blobs_full;
-}
-
 std::size_t cut_at_background(const Detector::Search& search, std::span<const Run> runs, std::span<Run> out,
                               bool& truncated) {
     const bool dark = search.side == Side::kBelow;
     return cut(runs, out, truncated, [&](int x, int y) {
         const int value = search.image.row(y)[x];
-        const int level = levels_of(search.thresholds, y)[static_cast<std::size_t>(x) / kBlockPx];
+        const int level = search.level(x, y);
         return dark ? value < level : value > level;
     });
 }
@@ -118,6 +96,14 @@ bool stands_alone(const Component& component, const Siblings& siblings) {
 
 }  // namespace
 
+void add_counts(DetectorReport& total, const DetectorReport& part) {
+    total.runs += part.runs;
+    total.candidates += part.candidates;
+    for (std::size_t i = 0; i < total.rejected.size(); ++i) total.rejected[i] += part.rejected[i];
+    total.runs_full |= part.runs_full;
+    total.blobs_full |= part.blobs_full;
+}
+
 Result<void, DetectorError> Detector::configure(const DetectorConfig& config) {
     const BlobLimits& blob = config.blob;
     if (!in_range(blob.max_diameter_px, 3.0, kMaxDotDiameterPx) ||
@@ -143,8 +129,8 @@ Result<void, DetectorError> Detector::configure(const DetectorConfig& config) {
     return {};
 }
 
-void Detector::measure_exposure(const ImageView& image, DetectorReport& report) {
-    const LumaSums sums = luma_sums(image);
+void Detector::measure_exposure(const ImageView& image, int row_step, DetectorReport& report) {
+    const LumaSums sums = luma_sums(image, row_step);
     report.mean_luma = static_cast<double>(sums.sum) / sums.samples;
     report.saturated_fraction = static_cast<double>(sums.saturated) / sums.samples;
     if (report.mean_luma < config_.dark_luma)
@@ -167,17 +153,17 @@ void Detector::measure_exposure(const ImageView& image, DetectorReport& report) 
 // The background is what remains when everything narrower than the largest disc is taken away (a closing for
 // dark discs, an opening for bright ones); a pixel is a candidate when it differs from it by a part of it.
 void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side,
-                              double largest_px) const {
+                              double largest_px) {
     std::copy(means.values.begin(), means.values.end(), thresholds.values.begin());
     const int radius = (static_cast<int>(largest_px) / static_cast<int>(kBlockPx) + 2) / 2;
     const int least = static_cast<int>(config_.blob.min_contrast);
     const int part = static_cast<int>(config_.relative_contrast * 256.0);
     if (side == Side::kBelow) {
-        sliding_max(thresholds, radius);
-        sliding_min(thresholds, radius);
+        sliding_max(thresholds, radius, workspace_.slide);
+        sliding_min(thresholds, radius, workspace_.slide);
     } else {
-        sliding_min(thresholds, radius);
-        sliding_max(thresholds, radius);
+        sliding_min(thresholds, radius, workspace_.slide);
+        sliding_max(thresholds, radius, workspace_.slide);
     }
     for (std::uint8_t& level : thresholds.values) {
         const int step = std::max(least, level * part >> 8);
@@ -195,9 +181,8 @@ bool Detector::has_core(const Search& search, std::span<const Run> runs) const {
     int deep = 0;
     for (const Run& run : runs) {
         const std::uint8_t* pixels = search.image.row(run.y);
-        const std::uint8_t* levels = levels_of(search.thresholds, run.y);
-        for (std::size_t x = run.begin; x < run.end; ++x) {
-            const int level = levels[x / kBlockPx];
+        for (int x = run.begin; x < run.end; ++x) {
+            const int level = search.level(x, run.y);
             const int step = std::max(least, level * part / whole);
             deep += sign * (level - pixels[x]) * 2 >= step ? 1 : 0;
         }
@@ -212,37 +197,37 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     result.report = DetectorReport{};
     w.failed.clear();
     const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
-    set_thresholds(means, thresholds, side, config_.blob.max_diameter_px);
+    const double largest = largest_marker(state_.usual_size_px);
+    set_thresholds(means, thresholds, side, largest);
     const std::size_t count = threshold_runs(image, thresholds, side, w.runs, result.report.runs_full);
     result.report.runs = static_cast<std::uint32_t>(count);
     const ComponentCounts counts =
-        connect(std::span<const Run>(w.runs).first(count), {least_area(config_.blob)},
+        connect(std::span<const Run>(w.runs).first(count), {least_area_px(config_.blob)},
                 {w.parents, w.areas, w.grouped, w.components});
     result.report.blobs_full = counts.dropped > 0;
-    const Search search{image, thresholds, side, config_.blob.max_diameter_px};
+    const Search search{image, thresholds, side, largest};
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& component = w.components[c];
         if (examine(search, component, members_of(component, w.grouped), {}, result)) continue;
         if (!w.failed.push_back(static_cast<std::uint16_t>(c))) result.report.blobs_full = true;
     }
-    split_failed(image, means, side, result);
+    split_failed(search, means, result);
     apply_population(side, result);
 }
 
 // Blobs that are no markers may hold some: a marker hangs together with a shadow, a strip of light or another
 // marker. Now that the size of the image's markers is known, the background is taken at that scale.
-void Detector::split_failed(const ImageView& image, const BlockGrid& means, Side side, SideResult& result) {
+void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResult& result) {
     Workspace& w = workspace_;
     if (w.failed.empty()) return;
-    const double usual = usual_size(result.blobs);
-    const double largest = usual > 0.0 ? std::min(usual * kSizeMargin, config_.blob.max_diameter_px)
-                                       : config_.blob.max_diameter_px;
-    const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
-    set_thresholds(means, thresholds, side, largest);
-    const Search search{image, thresholds, side, largest};
+    const double largest =
+        state_.usual_size_px > 0.0 ? wide.largest_px : largest_marker(usual_size(result.blobs));
+    const bool narrower = largest < wide.largest_px;
+    if (narrower) set_thresholds(means, wide.thresholds, wide.side, largest);
+    const Search search{wide.image, wide.thresholds, wide.side, largest, wide.grid_left, wide.grid_top};
     for (const std::uint16_t c : w.failed) {
         const Component& component = w.components[c];
-        split(search, 0, component, members_of(component, w.grouped), result);
+        split(search, narrower ? 0 : 1, component, members_of(component, w.grouped), result);
     }
 }
 
@@ -287,7 +272,7 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
                                   : cut_at_depth(search, kSplitDepths[level], runs, storage.runs, truncated);
     result.report.runs_full |= truncated;
     const ComponentCounts counts =
-        connect(std::span<const Run>(storage.runs).first(count), {least_area(config_.blob)},
+        connect(std::span<const Run>(storage.runs).first(count), {least_area_px(config_.blob)},
                 {w.parents, w.areas, storage.grouped, storage.components});
     result.report.blobs_full |= counts.dropped > 0;
     const Siblings all{std::span<const Component>(storage.components).first(counts.components),
@@ -299,6 +284,11 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
         if (!whole && examine(search, part, members, all, result)) continue;
         if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
     }
+}
+
+double Detector::largest_marker(double usual_size_px) const {
+    return usual_size_px > 0.0 ? std::min(usual_size_px * kSizeMargin, config_.blob.max_diameter_px)
+                               : config_.blob.max_diameter_px;
 }
 
 double Detector::usual_size(const Blobs& blobs) const {
@@ -346,6 +336,10 @@ void Detector::apply_population(Side side, SideResult& result) const {
     }
 }
 
+bool Detector::is_settled() const {
+    return config_.polarity != MarkerPolarity::kAuto || state_.agreed >= config_.polarity_frames;
+}
+
 void Detector::decide(std::size_t dark_or_bright) {
     const MarkerPolarity decision = dark_or_bright == 0 ? MarkerPolarity::kDark : MarkerPolarity::kBright;
     if (decision != state_.polarity) state_.agreed = 0;
@@ -391,14 +385,13 @@ std::size_t Detector::look(const ImageView& image, const BlockGrid& means, Detec
     Workspace& w = workspace_;
     const auto try_side = [&](std::size_t index) {
         detect_side(image, means, index == 0 ? Side::kBelow : Side::kAbove, w.sides[index]);
-        add_reports(report, w.sides[index].report);
+        add_counts(report, w.sides[index].report);
     };
     const bool automatic = config_.polarity == MarkerPolarity::kAuto;
     const MarkerPolarity likely = automatic ? state_.polarity : config_.polarity;
     const std::size_t first = likely == MarkerPolarity::kBright ? 1 : 0;
     try_side(first);
-    if (!automatic) return first;
-    if (state_.agreed >= config_.polarity_frames && w.sides[first].quality >= kSettledQuality) return first;
+    if (is_settled() && (!automatic || w.sides[first].quality >= kSettledQuality)) return first;
     try_side(1 - first);
     const std::size_t chosen = w.sides[1].quality > w.sides[0].quality ? 1 : 0;
     decide(chosen);
@@ -412,12 +405,17 @@ void Detector::detect(const ImageView& image, Observations& observations, Detect
         report.unprocessable = true;
         return;
     }
-    measure_exposure(image, report);
-    Workspace& w = workspace_;
-    const BlockGrid means = block_means(image, w.means);
-    const std::size_t chosen = look(image, means, report);
-    report.polarity = chosen == 0 ? MarkerPolarity::kDark : MarkerPolarity::kBright;
-    hand_on(w.sides[chosen], observations, report);
+    report.whole_image = true;
+    measure_exposure(image, kLumaRows, report);
+    const BlockGrid means = block_means(image, workspace_.means);
+    finish(look(image, means, report), observations, report);
+}
+
+void Detector::finish(std::size_t side, Observations& observations, DetectorReport& report) {
+    const SideResult& result = workspace_.sides[side];
+    report.polarity = side == 0 ? MarkerPolarity::kDark : MarkerPolarity::kBright;
+    state_.usual_size_px = usual_size(result.blobs);
+    hand_on(result, observations, report);
     if (report.runs_full || report.blobs_full || report.observations_full) {
         report.faults |= fault_bit(Fault::kBlobCapacity);
     }

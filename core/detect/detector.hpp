@@ -38,6 +38,14 @@ enum class DetectorError : std::uint8_t { kDiameters, kContrast, kShape, kScore,
 
 enum class ExposureFlag : std::uint8_t { kDark = 1, kFlooded = 2, kStep = 4 };
 
+// Where a marker is expected: within `reach_px` of a pixel. Not finite: left out.
+struct ExpectedMarker {
+    float x_px = 0.0F;
+    float y_px = 0.0F;
+    float reach_px = 0.0F;
+    bool surely = true;  // it was there in the last frame; others are looked for without missing them
+};
+
 struct DetectorReport {
     std::uint32_t runs = 0;
     std::uint32_t candidates = 0;                                                       // blobs measured
@@ -47,6 +55,7 @@ struct DetectorReport {
     bool runs_full = false;      // a capacity was reached: runs, blobs, observations
     bool blobs_full = false;
     bool observations_full = false;
+    bool whole_image = false;                         // every pixel was looked at, not windows only
     bool unprocessable = false;                       // no image, or larger than the limits
     MarkerPolarity polarity = MarkerPolarity::kDark;  // the side the observations come from
     double mean_luma = 0.0;                           // grey levels
@@ -54,6 +63,19 @@ struct DetectorReport {
     std::uint8_t exposure = 0;  // ExposureFlag bits
     FaultMap faults = 0;        // kExposure, kBlobCapacity
 };
+
+// Of the background at the scale of the largest marker.
+inline constexpr int kBackgroundRadius = static_cast<int>((kMaxDotDiameterPx / kBlockPx + 2) / 2);
+inline constexpr std::size_t kSlideBytes =
+    slide_scratch_bytes(kMaxImageWidth / kBlockPx, kMaxImageHeight / kBlockPx, kBackgroundRadius);
+static_assert(kBackgroundRadius <= kMaxSlideRadius);
+
+// Runs, candidates, rejections and full tables of one part of the work, added to a frame's.
+void add_counts(DetectorReport& total, const DetectorReport& part);
+
+inline constexpr float kMaxReachPx =
+    24.0F;  // an expected marker farther away than that is searched for in vain
+inline constexpr double kWindowShare = 0.75;
 
 // How often a blob that is no marker is cut again.
 inline constexpr std::size_t kSplitLevels = 3;
@@ -68,21 +90,38 @@ class Detector {
     // Every byte of the image inside width x height must be readable; anything else about it may be wrong.
     void detect(const ImageView& image, Observations& observations, DetectorReport& report);
 
+    // The same, reading only windows around where markers are expected: a tracker's predictions. Looks at the
+    // whole image instead (report.whole_image) while polarity and size of the markers are unknown, or when
+    // less than kWindowShare of the expected markers have an observation within their reach.
+    void detect_around(const ImageView& image, std::span<const ExpectedMarker> expected,
+                       Observations& observations, DetectorReport& report);
+
     // What one pass over an image looks for. Public for the file-local functions of the implementation only.
     struct Search {
         const ImageView& image;
         const BlockGrid& thresholds;
         Side side;
         double largest_px;  // longest marker
+        int grid_left = 0;  // px: where the thresholds' grid begins
+        int grid_top = 0;
+
+        [[nodiscard]] int level(int x, int y) const {
+            return thresholds.values[static_cast<std::size_t>((y - grid_top) / static_cast<int>(kBlockPx) *
+                                                                  thresholds.width +
+                                                              (x - grid_left) / static_cast<int>(kBlockPx))];
+        }
     };
 
-    // Forgets polarity and luma learnt from earlier frames.
+    // Forgets polarity, size and luma learnt from earlier frames.
     void reset() { state_ = State{}; }
+    // The next frame looks for markers of every size: what was taken for markers may have been none.
+    void forget_size() { state_.usual_size_px = 0.0; }
 
   private:
     struct State {
         MarkerPolarity polarity = MarkerPolarity::kAuto;  // the last decision
         std::uint8_t agreed = 0;                          // frames in a row that said so
+        double usual_size_px = 0.0;                       // long axis; 0 while unknown
         double usual_luma = -1.0;                         // running mean; negative before the first frame
     };
 
@@ -104,6 +143,7 @@ class Detector {
     struct Workspace {
         std::array<std::uint8_t, kMaxBlocks> means{};
         std::array<std::uint8_t, kMaxBlocks> background{};
+        std::array<std::uint8_t, kSlideBytes> slide{};
         std::array<Run, kMaxRuns> runs{};
         std::array<std::uint32_t, kMaxRuns> parents{};
         std::array<std::uint32_t, kMaxRuns> areas{};
@@ -111,16 +151,29 @@ class Detector {
         std::array<Component, kMaxBlobs> components{};
         std::array<SplitStorage, kSplitLevels> split{};
         BoundedVector<std::uint16_t, kMaxBlobs> failed;
+        BoundedVector<Component, kMaxCandidates> examined;  // by earlier windows of the frame
+        BitRows window{};                                   // beyond the threshold, not examined yet
+        BitRows reach{};
+        BitRows part{};
         BlobWorkspace blob;
         QuickWorkspace quick;
         std::array<SideResult, 2> sides;
     };
 
-    void measure_exposure(const ImageView& image, DetectorReport& report);
-    void set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side,
-                        double largest_px) const;
+    void measure_exposure(const ImageView& image, int row_step, DetectorReport& report);
+    void set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side, double largest_px);
     void detect_side(const ImageView& image, const BlockGrid& means, Side side, SideResult& result);
-    void split_failed(const ImageView& image, const BlockGrid& means, Side side, SideResult& result);
+    [[nodiscard]] bool search_windows(const ImageView& image, std::span<const ExpectedMarker> expected,
+                                      SideResult& result);
+    void search_window(const ImageView& image, Side side, const ExpectedMarker& expected, SideResult& result);
+    [[nodiscard]] bool examine_window(const Search& search, const ImageView& window,
+                                      const ExpectedMarker& expected, SideResult& result);
+    void examine_part(const Search& search, const ImageView& window, std::size_t number, SideResult& result);
+    static void drop_repeats(std::size_t first, SideResult& result);
+    [[nodiscard]] bool is_settled() const;
+    void finish(std::size_t side, Observations& observations, DetectorReport& report);
+    void split_failed(const Search& wide, const BlockGrid& means, SideResult& result);
+    [[nodiscard]] double largest_marker(double usual_size_px) const;
     void split(const Search& search, std::size_t level, const Component& component, std::span<const Run> runs,
                SideResult& result);
     [[nodiscard]] bool examine(const Search& search, const Component& component, std::span<const Run> runs,

@@ -6,34 +6,35 @@
 #include <cstring>
 
 #include "core/base/check.hpp"
+#include "core/image/pixel_lanes.hpp"
 
 namespace rig {
 
 namespace {
 
 constexpr int kBlock = static_cast<int>(kBlockPx);
-constexpr int kMaxRadius = 32;
-constexpr std::size_t kMaxGridSide =
-    (kMaxImageWidth > kMaxImageHeight ? kMaxImageWidth : kMaxImageHeight) / kBlockPx;
+constexpr std::size_t kLanes = kByteLanes;
 
 static_assert(kBlockPx == 4, "the block sums below are written for four pixels");
 
-using ColumnSums = std::array<std::uint16_t, kMaxImageWidth>;
+using ColumnSums = std::array<std::uint16_t, kMaxImageWidth / 2>;
 
-void add_rows(const ImageView& image, int top, ColumnSums& sums) {
-    const auto width = static_cast<std::size_t>(image.width_px);
-    const std::uint8_t* a = image.row(top);
-    const std::uint8_t* b = image.row(top + 1);
-    const std::uint8_t* c = image.row(top + 2);
-    const std::uint8_t* d = image.row(top + 3);
-    for (std::size_t x = 0; x < width; ++x) sums[x] = static_cast<std::uint16_t>(a[x] + b[x] + c[x] + d[x]);
-}
-
-// Sum of four neighbours by one multiplication: the top 16 bits collect all four lanes, at most 4 * 1020.
-std::uint32_t four(const std::uint16_t* sums) {
-    std::uint64_t lanes = 0;
-    std::memcpy(&lanes, sums, sizeof lanes);
-    return static_cast<std::uint32_t>((lanes * 0x0001000100010001ULL) >> 48);
+// Of four rows: sums of pairs of columns, for the first `pairs` of them.
+void add_rows(const ImageView& image, int top, std::size_t pairs, ColumnSums& sums) {
+    const std::uint8_t* row[kBlock];
+    for (int i = 0; i < kBlock; ++i) row[i] = image.row(top + i);
+    std::size_t p = 0;
+    for (; p + kLanes / 2 <= pairs; p += kLanes / 2) {
+        const EightSums sum =
+            (sums_of_pairs(load_bytes(row[0] + 2 * p)) + sums_of_pairs(load_bytes(row[1] + 2 * p))) +
+            (sums_of_pairs(load_bytes(row[2] + 2 * p)) + sums_of_pairs(load_bytes(row[3] + 2 * p)));
+        std::memcpy(&sums[p], &sum, sizeof(sum));
+    }
+    for (; p < pairs; ++p) {
+        unsigned sum = 0;
+        for (const std::uint8_t* pixels : row) sum += pixels[2 * p] + unsigned{pixels[2 * p + 1]};
+        sums[p] = static_cast<std::uint16_t>(sum);
+    }
 }
 
 std::uint8_t edge_block_mean(const ImageView& image, int block_x, int block_y) {
@@ -50,104 +51,157 @@ std::uint8_t edge_block_mean(const ImageView& image, int block_x, int block_y) {
 
 // One policy for maximum and one for minimum: the padding is the operation's neutral element.
 struct Max {
-    static constexpr std::uint8_t kNeutral = 0;
-    static std::uint8_t of(std::uint8_t a, std::uint8_t b) { return a > b ? a : b; }
+    static constexpr int kNeutral = 0;
+    static SixteenBytes of(SixteenBytes a, SixteenBytes b) { return a > b ? a : b; }
 };
 struct Min {
-    static constexpr std::uint8_t kNeutral = 255;
-    static std::uint8_t of(std::uint8_t a, std::uint8_t b) { return a < b ? a : b; }
+    static constexpr int kNeutral = 255;
+    static SixteenBytes of(SixteenBytes a, SixteenBytes b) { return a < b ? a : b; }
 };
 
-// Windows of `length` are built by doubling: after each round line[i] covers `span` entries from i on.
+// In place: entry i becomes the extreme of the `length` entries from i on, `stride` apart, as far as they are
+// among the `count`; by doubling: after each round it covers `span` of them. Whole vectors are read and
+// written: up to one beyond the end.
 template <class Op>
-void slide_row(std::uint8_t* values, std::size_t count, std::size_t radius) {
-    std::array<std::uint8_t, kMaxGridSide + 2 * kMaxRadius> line{};
-    std::memset(line.data(), Op::kNeutral, radius);
-    std::memcpy(line.data() + radius, values, count);
-    std::memset(line.data() + radius + count, Op::kNeutral, radius);
-    const std::size_t length = 2 * radius + 1;
-    const std::size_t total = count + 2 * radius;
+void extend(std::uint8_t* values, std::size_t count, std::size_t stride, std::size_t length) {
+    const auto widen = [&](std::size_t shift) {
+        for (std::size_t i = 0; i + shift < count; i += kLanes) {
+            store_bytes(Op::of(load_bytes(values + i), load_bytes(values + i + shift)), values + i);
+        }
+    };
     std::size_t span = 1;
-    for (; span * 2 <= length; span *= 2) {
-        for (std::size_t i = 0; i + span < total; ++i) line[i] = Op::of(line[i], line[i + span]);
-    }
-    const std::size_t shift = length - span;
-    for (std::size_t i = 0; i < count; ++i) values[i] = Op::of(line[i], line[i + shift]);
+    for (; span * 2 <= length; span *= 2) widen(span * stride);
+    if (span < length) widen((length - span) * stride);
 }
 
-// A strip of columns is copied out so that the vertical doubling works on contiguous bytes.
-constexpr std::size_t kStrip = 64;
-using Strip = std::array<std::uint8_t, (kMaxGridSide + 2 * kMaxRadius) * kStrip>;
-
+// The grid in a frame of neutral elements `radius` wide, so that rows and columns need no ends.
 template <class Op>
-void slide_strip(const BlockGrid& grid, std::size_t left, std::size_t radius, Strip& strip) {
-    const auto width = static_cast<std::size_t>(grid.width);
-    const auto height = static_cast<std::size_t>(grid.height);
-    const std::size_t columns = std::min(kStrip, width - left);
-    const std::size_t total = height + 2 * radius;
-    std::memset(strip.data(), Op::kNeutral, total * kStrip);
-    for (std::size_t y = 0; y < height; ++y) {
-        std::memcpy(&strip[(y + radius) * kStrip], &grid.values[y * width + left], columns);
-    }
-    const std::size_t length = 2 * radius + 1;
-    std::size_t span = 1;
-    for (; span * 2 <= length; span *= 2) {
-        for (std::size_t i = 0; i < (total - span) * kStrip; ++i)
-            strip[i] = Op::of(strip[i], strip[i + span * kStrip]);
-    }
-    const std::size_t shift = (length - span) * kStrip;
-    for (std::size_t i = 0; i < height * kStrip; ++i) strip[i] = Op::of(strip[i], strip[i + shift]);
-    for (std::size_t y = 0; y < height; ++y)
-        std::memcpy(&grid.values[y * width + left], &strip[y * kStrip], columns);
-}
-
-template <class Op>
-void slide(const BlockGrid& grid, int radius) {
-    RIG_CHECK(radius >= 0 && radius <= kMaxRadius);
-    RIG_CHECK(grid.width > 0 && static_cast<std::size_t>(grid.width) <= kMaxGridSide);
-    RIG_CHECK(grid.height > 0 && static_cast<std::size_t>(grid.height) <= kMaxGridSide);
+void slide(const BlockGrid& grid, int radius, std::span<std::uint8_t> scratch) {
+    RIG_CHECK(radius >= 0 && radius <= kMaxSlideRadius);
     const auto reach = static_cast<std::size_t>(radius);
     const auto width = static_cast<std::size_t>(grid.width);
-    for (std::size_t y = 0; y < static_cast<std::size_t>(grid.height); ++y) {
-        slide_row<Op>(&grid.values[y * width], width, reach);
+    const auto height = static_cast<std::size_t>(grid.height);
+    RIG_CHECK(scratch.size() >= slide_scratch_bytes(grid.width, grid.height, radius));
+    const std::size_t pitch = width + 2 * reach;
+    std::memset(scratch.data(), Op::kNeutral, slide_scratch_bytes(grid.width, grid.height, radius));
+    for (std::size_t y = 0; y < height; ++y) {
+        std::memcpy(&scratch[(y + reach) * pitch + reach], &grid.values[y * width], width);
     }
-    Strip strip;  // 35 kB of stack, only the part in use is touched
-    for (std::size_t left = 0; left < width; left += kStrip) slide_strip<Op>(grid, left, reach, strip);
+    extend<Op>(&scratch[reach * pitch], height * pitch, 1, 2 * reach + 1);
+    extend<Op>(scratch.data(), (height + 2 * reach) * pitch, pitch, 2 * reach + 1);
+    for (std::size_t y = 0; y < height; ++y) {
+        std::memcpy(&grid.values[y * width], &scratch[y * pitch], width);
+    }
 }
 
-void mark_below(const std::uint8_t* pixels, const std::uint8_t* thresholds, std::size_t width,
-                std::uint8_t* mask) {
-    for (std::size_t x = 0; x < width; ++x) mask[x] = pixels[x] < thresholds[x] ? 255 : 0;
+// Levels of a row of blocks for each of its pixels; beyond `width`, for a vector's length, levels that no
+// pixel is beyond.
+void spread_levels(const BlockGrid& thresholds, int block_y, Side side, std::size_t width,
+                   std::uint8_t* levels) {
+    const auto blocks = static_cast<std::size_t>(thresholds.width);
+    const std::uint8_t* row = &thresholds.values[static_cast<std::size_t>(block_y) * blocks];
+    for (std::size_t b = 0; b < blocks; ++b) {
+        const std::uint32_t four_times = row[b] * 0x01010101U;
+        std::memcpy(levels + b * kBlockPx, &four_times, kBlockPx);
+    }
+    std::memset(levels + width, side == Side::kBelow ? 0 : 255, kLanes);
 }
 
-void mark_above(const std::uint8_t* pixels, const std::uint8_t* thresholds, std::size_t width,
-                std::uint8_t* mask) {
-    for (std::size_t x = 0; x < width; ++x) mask[x] = pixels[x] > thresholds[x] ? 255 : 0;
+template <Side kSide>
+SixteenBytes beyond(const std::uint8_t* pixels, const std::uint8_t* levels) {
+    const SixteenBytes v = load_bytes(pixels);
+    const SixteenBytes level = load_bytes(levels);
+    return reinterpret_cast<SixteenBytes>(kSide == Side::kBelow ? v < level : v > level);
 }
 
-// `mask` is padded with zeros to a multiple of eight, plus eight, so that an open run always closes.
-std::size_t scan_row(const std::uint8_t* mask, std::size_t width, int y, Run* runs) {
-    std::size_t count = 0;
-    std::size_t begin = 0;
-    std::uint32_t open = 0;
-    for (std::size_t x = 0; x <= width; x += 8) {
-        std::uint64_t word = 0;
-        std::memcpy(&word, mask + x, sizeof word);
-        if (word == (open != 0 ? ~std::uint64_t{0} : 0)) continue;
-        const std::uint32_t bits = packed_bytes(word);
-        std::uint32_t changes = (bits ^ (bits << 1 | open)) & 0xFFU;
+// The last pixels of a row, fewer than a vector, as one.
+std::array<std::uint8_t, kLanes> last_pixels(const std::uint8_t* pixels, std::size_t count) {
+    std::array<std::uint8_t, kLanes> rest{};
+    std::memcpy(rest.data(), pixels, count);
+    return rest;
+}
+
+constexpr std::size_t kScan = 2 * kLanes;  // pixels looked at in one step
+
+// Runs of one row, pixels in `levels` order; the row and its levels are readable to a multiple of kScan.
+class RowScan {
+  public:
+    RowScan(int y, Run* runs) : y_(static_cast<std::uint16_t>(y)), runs_(runs) {}
+
+    // kScan or kLanes pixels.
+    template <Side kSide>
+    void look_at_two(const std::uint8_t* pixels, const std::uint8_t* levels, std::size_t from) {
+        const SixteenBytes low = beyond<kSide>(pixels, levels);
+        const SixteenBytes high = beyond<kSide>(pixels + kLanes, levels + kLanes);
+        if (open_ || any_bit(low | high))
+            add(bits_of_bytes(low) | bits_of_bytes(high) << kLanes, kScan, from);
+    }
+    template <Side kSide>
+    void look_at_one(const std::uint8_t* pixels, const std::uint8_t* levels, std::size_t from) {
+        const SixteenBytes mask = beyond<kSide>(pixels, levels);
+        if (open_ || any_bit(mask)) add(bits_of_bytes(mask), kLanes, from);
+    }
+    std::size_t close(std::size_t width) {
+        if (open_) end(width);
+        return count_;
+    }
+
+  private:
+    void add(std::uint32_t bits, std::size_t count, std::size_t from) {
+        const auto these = static_cast<std::uint32_t>((std::uint64_t{1} << count) - 1);
+        std::uint32_t changes = (bits ^ (bits << 1 | (open_ ? 1U : 0U))) & these;
         for (; changes != 0; changes &= changes - 1) {
-            const std::size_t at = x + static_cast<std::size_t>(std::countr_zero(changes));
-            if (open == 0) {
-                begin = at;
+            const std::size_t at = from + static_cast<std::size_t>(std::countr_zero(changes));
+            if (open_) {
+                end(at);
             } else {
-                runs[count++] = {static_cast<std::uint16_t>(y), static_cast<std::uint16_t>(begin),
-                                 static_cast<std::uint16_t>(at)};
+                begin_ = static_cast<std::uint16_t>(at);
+                open_ = true;
             }
-            open ^= 1U;
         }
     }
-    return count;
+    void end(std::size_t at) {
+        runs_[count_++] = {y_, begin_, static_cast<std::uint16_t>(at)};
+        open_ = false;
+    }
+
+    std::uint16_t y_;
+    std::uint16_t begin_ = 0;
+    bool open_ = false;
+    std::size_t count_ = 0;
+    Run* runs_;
+};
+
+// `levels` is neutral beyond the width.
+template <Side kSide>
+std::size_t scan_row(const std::uint8_t* pixels, const std::uint8_t* levels, int y, std::size_t width,
+                     Run* runs) {
+    RowScan scan(y, runs);
+    std::size_t x = 0;
+    for (; x + kScan <= width; x += kScan) scan.look_at_two<kSide>(pixels + x, levels + x, x);
+    if (x + kLanes <= width) {
+        scan.look_at_one<kSide>(pixels + x, levels + x, x);
+        x += kLanes;
+    }
+    if (x < width) {
+        scan.look_at_one<kSide>(last_pixels(pixels + x, width - x).data(), levels + x, x);
+    }
+    return scan.close(width);
+}
+
+template <Side kSide>
+std::uint64_t bits_of_row(const std::uint8_t* pixels, const std::uint8_t* levels, std::size_t width) {
+    std::uint64_t bits = 0;
+    std::size_t x = 0;
+    for (; x + kLanes <= width; x += kLanes) {
+        const SixteenBytes mask = beyond<kSide>(pixels + x, levels + x);
+        if (any_bit(mask)) bits |= std::uint64_t{bits_of_bytes(mask)} << x;
+    }
+    if (x < width) {
+        const auto rest = last_pixels(pixels + x, width - x);
+        bits |= std::uint64_t{bits_of_bytes(beyond<kSide>(rest.data(), levels + x))} << x;
+    }
+    return bits;
 }
 
 }  // namespace
@@ -170,38 +224,45 @@ BlockGrid block_means(const ImageView& image, std::span<std::uint8_t> storage) {
         const bool full_height = (by + 1) * kBlock <= image.height_px;
         std::size_t done = 0;
         if (full_height) {
-            add_rows(image, by * kBlock, sums);
+            add_rows(image, by * kBlock, 2 * whole, sums);
             for (; done < whole; ++done)
-                out[done] = static_cast<std::uint8_t>((four(&sums[4 * done]) + 8) >> 4);
+                out[done] = static_cast<std::uint8_t>((sums[2 * done] + sums[2 * done + 1] + 8) >> 4);
         }
         for (; done < width; ++done) out[done] = edge_block_mean(image, static_cast<int>(done), by);
     }
     return grid;
 }
 
-LumaSums luma_sums(const ImageView& image) {
-    RIG_CHECK(is_processable(image));
+LumaSums luma_sums(const ImageView& image, int row_step) {
+    RIG_CHECK(is_processable(image) && row_step > 0);
+    constexpr std::size_t kRoom = 65535 / 510 * kLanes;  // pixels whose sums of pairs 16 bits hold
     LumaSums sums;
     const auto width = static_cast<std::size_t>(image.width_px);
-    for (int y = 0; y < image.height_px; y += 4) {
+    for (int y = 0; y < image.height_px; y += row_step) {
         const std::uint8_t* pixels = image.row(y);
-        std::uint32_t sum = 0;
-        std::uint32_t saturated = 0;
-        for (std::size_t x = 0; x < width; ++x) sum += pixels[x];
-        for (std::size_t x = 0; x < width; ++x) saturated += pixels[x] == 255 ? 1U : 0U;
-        sums.sum += sum;
-        sums.saturated += saturated;
+        std::size_t x = 0;
+        while (x + kLanes <= width) {
+            EightSums sum{};
+            EightSums saturated{};
+            for (const std::size_t end = std::min(width, x + kRoom); x + kLanes <= end; x += kLanes) {
+                const SixteenBytes v = load_bytes(pixels + x);
+                sum += sums_of_pairs(v);
+                saturated += sums_of_pairs(reinterpret_cast<SixteenBytes>(v == SixteenBytes{} + 255) & 1);
+            }
+            for (std::size_t i = 0; i < kLanes / 2; ++i) sums.sum += sum[i], sums.saturated += saturated[i];
+        }
+        for (; x < width; ++x) sums.sum += pixels[x], sums.saturated += pixels[x] == 255 ? 1U : 0U;
         sums.samples += static_cast<std::uint32_t>(width);
     }
     return sums;
 }
 
-void sliding_max(const BlockGrid& grid, int radius) {
-    slide<Max>(grid, radius);
+void sliding_max(const BlockGrid& grid, int radius, std::span<std::uint8_t> scratch) {
+    slide<Max>(grid, radius, scratch);
 }
 
-void sliding_min(const BlockGrid& grid, int radius) {
-    slide<Min>(grid, radius);
+void sliding_min(const BlockGrid& grid, int radius, std::span<std::uint8_t> scratch) {
+    slide<Min>(grid, radius, scratch);
 }
 
 std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, Side side,
@@ -211,31 +272,37 @@ std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, 
               thresholds.height == blocks_across(image.height_px));
     truncated = false;
     const auto width = static_cast<std::size_t>(image.width_px);
-    const auto blocks = static_cast<std::size_t>(thresholds.width);
-    std::array<std::uint8_t, kMaxImageWidth> levels;
-    std::array<std::uint8_t, kMaxImageWidth + 16> mask;
-    std::memset(&mask[width], 0, 16);
+    std::array<std::uint8_t, kMaxImageWidth + kLanes> levels;
     std::size_t count = 0;
     for (int y = 0; y < image.height_px; ++y) {
         if (y % kBlock == 0) {
-            const std::uint8_t* row = &thresholds.values[static_cast<std::size_t>(y / kBlock) * blocks];
-            for (std::size_t b = 0; b < blocks; ++b) {
-                const std::uint32_t four_times = row[b] * 0x01010101U;
-                std::memcpy(&levels[b * kBlockPx], &four_times, kBlockPx);
-            }
+            spread_levels(thresholds, y / kBlock, side, width, levels.data());
         }
         if (runs.size() - count < width / 2 + 1) {  // the most runs a row can have
             truncated = true;
             break;
         }
-        if (side == Side::kBelow) {
-            mark_below(image.row(y), levels.data(), width, mask.data());
-        } else {
-            mark_above(image.row(y), levels.data(), width, mask.data());
-        }
-        count += scan_row(mask.data(), width, y, &runs[count]);
+        count += side == Side::kBelow
+                     ? scan_row<Side::kBelow>(image.row(y), levels.data(), y, width, &runs[count])
+                     : scan_row<Side::kAbove>(image.row(y), levels.data(), y, width, &runs[count]);
     }
     return count;
+}
+
+void threshold_bits(const ImageView& image, const BlockGrid& thresholds, Side side,
+                    std::span<std::uint64_t> rows) {
+    RIG_CHECK(is_processable(image) && image.width_px <= 64);
+    RIG_CHECK(rows.size() >= static_cast<std::size_t>(image.height_px));
+    RIG_CHECK(thresholds.width == blocks_across(image.width_px) &&
+              thresholds.height == blocks_across(image.height_px));
+    const auto width = static_cast<std::size_t>(image.width_px);
+    std::array<std::uint8_t, 64 + kLanes> levels;
+    for (int y = 0; y < image.height_px; ++y) {
+        if (y % kBlock == 0) spread_levels(thresholds, y / kBlock, side, width, levels.data());
+        rows[static_cast<std::size_t>(y)] =
+            side == Side::kBelow ? bits_of_row<Side::kBelow>(image.row(y), levels.data(), width)
+                                 : bits_of_row<Side::kAbove>(image.row(y), levels.data(), width);
+    }
 }
 
 }  // namespace rig

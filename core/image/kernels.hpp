@@ -35,7 +35,6 @@ struct Run {
     return static_cast<std::uint32_t>(((word & 0x0101010101010101ULL) * 0x0102040810204080ULL) >> 56);
 }
 
-// Every fourth row counts.
 struct LumaSums {
     std::uint64_t sum = 0;
     std::uint32_t saturated = 0;  // pixels of 255
@@ -49,11 +48,20 @@ struct LumaSums {
 // `storage` holds at least the grid's blocks. Precondition: is_processable(image).
 [[nodiscard]] BlockGrid block_means(const ImageView& image, std::span<std::uint8_t> storage);
 
-[[nodiscard]] LumaSums luma_sums(const ImageView& image);
+// Of every `row_step`-th row.
+[[nodiscard]] LumaSums luma_sums(const ImageView& image, int row_step);
 
-// Extreme over the (2 radius + 1)^2 neighbourhood, clipped at the border, in place. 0 <= radius <= 32.
-void sliding_max(const BlockGrid& grid, int radius);
-void sliding_min(const BlockGrid& grid, int radius);
+inline constexpr int kMaxSlideRadius = 12;
+
+[[nodiscard]] constexpr std::size_t slide_scratch_bytes(int width, int height, int radius) {
+    const auto framed = [radius](int side) { return static_cast<std::size_t>(side + 2 * radius); };
+    return framed(width) * framed(height) + 32;  // whole vectors reach beyond the end
+}
+
+// Extreme over the (2 radius + 1)^2 neighbourhood, clipped at the border, in place. 0 <= radius <=
+// kMaxSlideRadius. `scratch` holds at least slide_scratch_bytes().
+void sliding_max(const BlockGrid& grid, int radius, std::span<std::uint8_t> scratch);
+void sliding_min(const BlockGrid& grid, int radius, std::span<std::uint8_t> scratch);
 
 enum class Side : std::uint8_t { kBelow, kAbove };
 
@@ -61,5 +69,10 @@ enum class Side : std::uint8_t { kBelow, kAbove };
 // written; stops at the end of a row that might not fit and then sets `truncated`.
 [[nodiscard]] std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, Side side,
                                          std::span<Run> runs, bool& truncated);
+
+// The same pixels as bits: pixel x of row y is bit x of rows[y]. The image is at most 64 pixels wide, `rows`
+// at least as long as it is high.
+void threshold_bits(const ImageView& image, const BlockGrid& thresholds, Side side,
+                    std::span<std::uint64_t> rows);
 
 }  // namespace rig

@@ -1,5 +1,6 @@
-// Eight pixels at a time as 16-bit lanes, four as floats. The width is fixed, whatever the machine has, and
-// every operation stands alone in its lane or adds integers, so the bits are those of a plain loop.
+// Sixteen pixels at a time as bytes, eight as 16-bit lanes, four as floats. The width is fixed, whatever the
+// machine has, and every operation stands alone in its lane or adds integers, so the bits are those of a
+// plain loop.
 #pragma once
 
 #include <array>
@@ -15,7 +16,10 @@ using PixelLanes = std::int16_t __attribute__((vector_size(16)));
 using FourFloats = float __attribute__((vector_size(16)));
 using FourInts = std::int32_t __attribute__((vector_size(16)));
 
+inline constexpr int kByteLanes = 16;
+
 using SixteenBytes = std::uint8_t __attribute__((vector_size(16)));
+using EightSums = std::uint16_t __attribute__((vector_size(16)));
 using EightSigned = std::int8_t __attribute__((vector_size(8)));
 
 [[nodiscard]] inline PixelLanes all_lanes(int value) {
@@ -29,6 +33,38 @@ using EightSigned = std::int8_t __attribute__((vector_size(8)));
 // `first`, `first` + 1, ... in the eight lanes.
 [[nodiscard]] inline PixelLanes counting_lanes(int first) {
     return PixelLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<std::int16_t>(first);
+}
+
+[[nodiscard]] inline SixteenBytes load_bytes(const std::uint8_t* from) {
+    SixteenBytes bytes;
+    std::memcpy(&bytes, from, sizeof(bytes));
+    return bytes;
+}
+
+inline void store_bytes(SixteenBytes bytes, std::uint8_t* to) {
+    std::memcpy(to, &bytes, sizeof(bytes));
+}
+
+// Sums of neighbours: byte 2i + byte 2i + 1 in lane i.
+[[nodiscard]] inline EightSums sums_of_pairs(SixteenBytes bytes) {
+    const auto pairs = reinterpret_cast<EightSums>(bytes);
+    return (pairs & 0xFF) + (pairs >> 8);
+}
+
+// One bit for each byte of 0xFF, none for those of 0.
+[[nodiscard]] inline std::uint32_t bits_of_bytes(SixteenBytes mask) {
+    std::uint64_t words[2];
+    std::memcpy(words, &mask, sizeof(words));
+    const auto packed = [](std::uint64_t word) {
+        return static_cast<std::uint32_t>(((word & 0x0101010101010101ULL) * 0x0102040810204080ULL) >> 56);
+    };
+    return packed(words[0]) | packed(words[1]) << 8;
+}
+
+[[nodiscard]] inline bool any_bit(SixteenBytes bytes) {
+    std::uint64_t words[2];
+    std::memcpy(words, &bytes, sizeof(words));
+    return (words[0] | words[1]) != 0;
 }
 
 // Spelt as interleaving with zeros, which every machine has as one instruction; a conversion of the vector
@@ -78,12 +114,23 @@ struct EightInts {
     return {__builtin_convertvector(whole.low, FourFloats), __builtin_convertvector(whole.high, FourFloats)};
 }
 
+// Whole numbers within 16 bits, as lanes.
+[[nodiscard]] inline PixelLanes lanes_of_ints(const EightInts& v) {
+    const auto low = reinterpret_cast<PixelLanes>(v.low);
+    const auto high = reinterpret_cast<PixelLanes>(v.high);
+    return __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
+}
+
+// Towards zero; |v| < 2^15.
+[[nodiscard]] inline PixelLanes truncated_lanes(const EightFloats& v) {
+    return lanes_of_ints(
+        {__builtin_convertvector(v.low, FourInts), __builtin_convertvector(v.high, FourInts)});
+}
+
 // To nearest; |v| < 2^15.
 [[nodiscard]] inline PixelLanes rounded_lanes(const EightFloats& v) {
     const auto nearest = [](FourFloats f) { return __builtin_convertvector(f + 32768.5F, FourInts) - 32768; };
-    const auto low = reinterpret_cast<PixelLanes>(nearest(v.low));
-    const auto high = reinterpret_cast<PixelLanes>(nearest(v.high));
-    return __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
+    return lanes_of_ints({nearest(v.low), nearest(v.high)});
 }
 
 [[nodiscard]] inline int sum_of_ints(FourInts v) {

@@ -86,8 +86,9 @@ TEST(Kernels, SlidingExtremesEqualThePlainSearch) {
             for (std::uint8_t& value : values) value = static_cast<std::uint8_t>(random.bits());
             std::vector<std::uint8_t> high = values;
             std::vector<std::uint8_t> low = values;
-            sliding_max({high, size.width, size.height}, radius);
-            sliding_min({low, size.width, size.height}, radius);
+            std::vector<std::uint8_t> scratch(slide_scratch_bytes(size.width, size.height, radius));
+            sliding_max({high, size.width, size.height}, radius, scratch);
+            sliding_min({low, size.width, size.height}, radius, scratch);
             using Byte = std::uint8_t;
             EXPECT_EQ(high, plain_extreme(values, size.width, size.height, radius,
                                           [](Byte a, Byte b) { return std::max(a, b); }));
@@ -146,11 +147,11 @@ TEST(Kernels, TooManyRunsStopAtARowAndSaySo) {
     EXPECT_EQ(count, 96U);  // three rows of 32; a fourth might not fit
 }
 
-TEST(Kernels, LumaCountsEveryFourthRow) {
+TEST(Kernels, LumaCountsEveryRowOfTheStep) {
     std::vector<std::uint8_t> bytes(8 * 10, 10);
     for (std::size_t x = 0; x < 8; ++x) bytes[4 * 8 + x] = 255;
     const LumaSums sums =
-        luma_sums({.pixels = bytes.data(), .width_px = 8, .height_px = 10, .stride_bytes = 8});
+        luma_sums({.pixels = bytes.data(), .width_px = 8, .height_px = 10, .stride_bytes = 8}, 4);
     EXPECT_EQ(sums.samples, 24U);
     EXPECT_EQ(sums.saturated, 8U);
     EXPECT_EQ(sums.sum, 16U * 10U + 8U * 255U);

@@ -1,0 +1,246 @@
+#include <algorithm>
+#include <bit>
+
+#include "core/base/math.hpp"
+#include "core/detect/bit_rows.hpp"
+#include "core/detect/components.hpp"
+#include "core/detect/detector.hpp"
+#include "core/image/kernels.hpp"
+#include "core/image/pixel_lanes.hpp"
+
+namespace rig {
+
+namespace {
+
+constexpr int kLumaRows = 16;                // every so manieth row: windows are to cost less than that
+constexpr double kSurroundingsPx = 8;        // of skin about a marker, for its background and its moat
+constexpr std::size_t kMaxWindowParts = 16;  // that reach into one square; more are noise
+constexpr int kBlock = static_cast<int>(kBlockPx);
+
+// Part of an image, in its pixels; whole blocks of it, so that their means are those of the whole image, and
+// whole vectors of pixels where the image is wide enough.
+struct Window {
+    int left = 0;
+    int top = 0;
+    int right = 0;  // exclusive
+    int bottom = 0;
+};
+
+double reach_of(const ExpectedMarker& expected) {
+    return static_cast<double>(std::min(expected.reach_px, kMaxReachPx));
+}
+
+Window window_about(const ImageView& image, const ExpectedMarker& expected, double size_px) {
+    const double half =
+        std::min(0.5 * kBlobWindowPx - kBlock, 0.5 * size_px + reach_of(expected) + kSurroundingsPx);
+    const auto x = static_cast<double>(expected.x_px);
+    const auto y = static_cast<double>(expected.y_px);
+    const auto bound = [](double at, int limit) {
+        return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(limit)));
+    };
+    const auto whole = [](int length, int unit) {
+        return std::min((length + unit - 1) / unit * unit, static_cast<int>(kBlobWindowPx));
+    };
+    Window window;
+    window.left = bound(x - half, image.width_px) / kBlock * kBlock;
+    window.top = bound(y - half, image.height_px) / kBlock * kBlock;
+    window.right = window.left + whole(bound(x + half + 1.0, image.width_px) - window.left, kByteLanes);
+    window.bottom = window.top + whole(bound(y + half + 1.0, image.height_px) - window.top, kBlock);
+    window.right = std::min(window.right, image.width_px);
+    window.bottom = std::min(window.bottom, image.height_px);
+    return window;
+}
+
+bool is_usable(const ExpectedMarker& expected) {
+    const auto within = [](float v) { return v > -1e4F && v < 1e4F; };  // false for NaN
+    return within(expected.x_px) && within(expected.y_px) && expected.reach_px >= 0.0F;
+}
+
+bool is_within_reach(double x_px, double y_px, const ExpectedMarker& expected) {
+    const double dx = x_px - static_cast<double>(expected.x_px);
+    const double dy = y_px - static_cast<double>(expected.y_px);
+    const double reach = reach_of(expected);
+    return dx * dx + dy * dy <= reach * reach;
+}
+
+// The square about the expected place; parts of what reaches into it may be the marker.
+void mark_reach(const ExpectedMarker& expected, const ImageView& window, int left, int top, BitRows& rows) {
+    const double reach = reach_of(expected);
+    const auto bound = [](double at, int limit) {
+        return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(limit)));
+    };
+    const double x = static_cast<double>(expected.x_px) - left;
+    const double y = static_cast<double>(expected.y_px) - top;
+    const std::uint64_t span =
+        bit_span(bound(x - reach, window.width_px), bound(x + reach + 1.0, window.width_px));
+    const int last = bound(y + reach + 1.0, window.height_px);
+    std::fill_n(rows.begin(), window.height_px, std::uint64_t{0});
+    for (int row = bound(y - reach, window.height_px); row < last; ++row) {
+        rows[static_cast<std::size_t>(row)] = span;
+    }
+}
+
+// A connected set of bits as a component in pixels of the image; its runs go to `runs`. False: no room.
+bool component_of(const BitRows& rows, int height, int left, int top, std::span<Run> runs,
+                  Component& component) {
+    component = Component{};
+    component.left = 0xFFFF;
+    for (int y = 0; y < height; ++y) {
+        for (std::uint64_t rest = rows[static_cast<std::size_t>(y)]; rest != 0;) {
+            const int begin = std::countr_zero(rest);
+            const int end = begin + std::countr_one(rest >> begin);
+            rest = end < 64 ? rest & ~row_mask(end) : 0;
+            if (component.count == runs.size()) return false;
+            const Run run{static_cast<std::uint16_t>(top + y), static_cast<std::uint16_t>(left + begin),
+                          static_cast<std::uint16_t>(left + end)};
+            if (component.count == 0) component.top = run.y;
+            runs[component.count++] = run;
+            component.area_px += static_cast<std::uint32_t>(end - begin);
+            component.left = std::min(component.left, run.begin);
+            component.right = std::max(component.right, static_cast<std::uint16_t>(run.end - 1));
+            component.bottom = run.y;
+        }
+    }
+    return true;
+}
+
+// Whether the window cuts it off: the image goes on there.
+bool is_cut_off(const Component& component, const Detector::Search& search, const ImageView& window) {
+    const int right = search.grid_left + window.width_px;
+    const int bottom = search.grid_top + window.height_px;
+    return (component.left == search.grid_left && search.grid_left > 0) ||
+           (component.top == search.grid_top && search.grid_top > 0) ||
+           (component.right + 1 == right && right < search.image.width_px) ||
+           (component.bottom + 1 == bottom && bottom < search.image.height_px);
+}
+
+bool are_one(const Blob& a, const Blob& b) {
+    const double dx = a.x_px - b.x_px;
+    const double dy = a.y_px - b.y_px;
+    const double apart = 0.5 * std::min(a.short_axis_px, b.short_axis_px);
+    return dx * dx + dy * dy < apart * apart;
+}
+
+bool is_same(const Component& a, const Component& b) {
+    return a.left == b.left && a.top == b.top && a.right == b.right && a.bottom == b.bottom;
+}
+
+}  // namespace
+
+// As detect_side(), of a part of the image.
+void Detector::search_window(const ImageView& image, Side side, const ExpectedMarker& expected,
+                             SideResult& result) {
+    Workspace& w = workspace_;
+    const Window window = window_about(image, expected, state_.usual_size_px);
+    if (window.right - window.left < kBlock || window.bottom - window.top < kBlock) return;
+    const ImageView part{image.row(window.top) + window.left, window.right - window.left,
+                         window.bottom - window.top, image.stride_bytes};
+    const BlockGrid means = block_means(part, w.means);
+    const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
+    const double largest = largest_marker(state_.usual_size_px);
+    set_thresholds(means, thresholds, side, largest);
+    threshold_bits(part, thresholds, side, w.window);
+    const Search search{image, thresholds, side, largest, window.left, window.top};
+    const std::size_t before = result.blobs.size();
+    if (!examine_window(search, part, expected, result)) split_failed(search, means, result);
+    drop_repeats(before, result);
+}
+
+// What a window cuts off may have been measured as a part of something else before.
+void Detector::drop_repeats(std::size_t first, SideResult& result) {
+    std::size_t kept = first;
+    for (std::size_t i = first; i < result.blobs.size(); ++i) {
+        const auto before = std::span(result.blobs.span()).first(first);
+        const auto again = [&](const Blob& other) { return are_one(other, result.blobs[i]); };
+        if (std::none_of(before.begin(), before.end(), again)) result.blobs[kept++] = result.blobs[i];
+    }
+    result.blobs.resize(kept);
+}
+
+// Measures what reaches into the square about the expected place; true when a marker is within reach.
+bool Detector::examine_window(const Search& search, const ImageView& window, const ExpectedMarker& expected,
+                              SideResult& result) {
+    Workspace& w = workspace_;
+    const auto height = static_cast<std::size_t>(window.height_px);
+    w.failed.clear();
+    mark_reach(expected, window, search.grid_left, search.grid_top, w.reach);
+    std::size_t parts = 0;
+    std::size_t used = 0;
+    for (std::size_t y = 0; y < height; ++y) {
+        while ((w.reach[y] & w.window[y]) != 0 && parts < kMaxWindowParts) {
+            const std::uint64_t within = w.reach[y] & w.window[y];
+            std::fill_n(w.part.begin(), height, std::uint64_t{0});
+            w.part[y] = within & (~within + 1);
+            flood(w.part, w.window, window.height_px);
+            for (std::size_t k = 0; k < height; ++k) w.window[k] &= ~w.part[k];
+            Component& component = w.components[parts];
+            const std::span<Run> room = std::span(w.grouped).subspan(used);
+            if (!component_of(w.part, window.height_px, search.grid_left, search.grid_top, room, component) ||
+                component.area_px < least_area_px(config_.blob)) {
+                continue;
+            }
+            component.first = static_cast<std::uint32_t>(used);
+            used += component.count;
+            examine_part(search, window, parts++, result);
+        }
+    }
+    result.report.runs += static_cast<std::uint32_t>(used);
+    return std::any_of(result.blobs.begin(), result.blobs.end(),
+                       [&](const Blob& blob) { return is_within_reach(blob.x_px, blob.y_px, expected); });
+}
+
+void Detector::examine_part(const Search& search, const ImageView& window, std::size_t number,
+                            SideResult& result) {
+    Workspace& w = workspace_;
+    const Component& component = w.components[number];
+    const auto same = [&](const Component& other) { return is_same(component, other); };
+    if (std::any_of(w.examined.begin(), w.examined.end(), same)) return;
+    const bool whole = !is_cut_off(component, search, window);
+    if (whole && !w.examined.push_back(component)) result.report.blobs_full = true;
+    if (!whole || !examine(search, component, members_of(component, w.grouped), {}, result)) {
+        result.report.blobs_full |= !w.failed.push_back(static_cast<std::uint16_t>(number));
+    }
+}
+
+bool Detector::search_windows(const ImageView& image, std::span<const ExpectedMarker> expected,
+                              SideResult& result) {
+    const MarkerPolarity polarity =
+        config_.polarity == MarkerPolarity::kAuto ? state_.polarity : config_.polarity;
+    const Side side = polarity == MarkerPolarity::kBright ? Side::kAbove : Side::kBelow;
+    result.blobs.clear();
+    result.report = DetectorReport{};
+    workspace_.examined.clear();
+    for (const ExpectedMarker& marker : expected) {
+        if (is_usable(marker)) search_window(image, side, marker, result);
+    }
+    apply_population(side, result);
+    std::size_t sure = 0;
+    std::size_t met = 0;
+    for (const ExpectedMarker& marker : expected) {
+        if (!is_usable(marker) || !marker.surely) continue;
+        ++sure;
+        met += std::any_of(result.blobs.begin(), result.blobs.end(), [&](const Blob& blob) {
+            return blob.score >= config_.min_score && is_within_reach(blob.x_px, blob.y_px, marker);
+        });
+    }
+    return sure > 0 && static_cast<double>(met) >= kWindowShare * static_cast<double>(sure);
+}
+
+void Detector::detect_around(const ImageView& image, std::span<const ExpectedMarker> expected,
+                             Observations& observations, DetectorReport& report) {
+    const bool knows = is_processable(image) && is_settled() && state_.usual_size_px > 0.0;
+    const MarkerPolarity polarity =
+        config_.polarity == MarkerPolarity::kAuto ? state_.polarity : config_.polarity;
+    const std::size_t side = polarity == MarkerPolarity::kBright ? 1 : 0;
+    if (!knows || !search_windows(image, expected, workspace_.sides[side])) {
+        detect(image, observations, report);
+        return;
+    }
+    observations.clear();
+    report = DetectorReport{};
+    measure_exposure(image, kLumaRows, report);
+    add_counts(report, workspace_.sides[side].report);
+    finish(side, observations, report);
+}
+
+}  // namespace rig
