@@ -5,10 +5,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <ctime>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,7 @@
 #include "tests/support/dot_scene/dot_scene.hpp"
 #include "tests/support/dot_scene/match.hpp"
 #include "tests/support/image_truth/image_truth.hpp"
+#include "tests/support/random.hpp"
 #include "tests/support/shared_data.hpp"
 
 namespace {
@@ -77,6 +80,30 @@ void add_scenes(std::vector<BenchFrame>& frames) {
         for (const test::SceneDot& dot : scene.dots) frame.dots.push_back({dot.x_px, dot.y_px, 3.0, true});
         frames.push_back(std::move(frame));
     }
+}
+
+// As in a take: the detector has seen frames like this one before.
+std::vector<test::SeenDot> run_settled(Detector& detector, const BenchFrame& frame,
+                                       std::span<const ExpectedMarker> expected) {
+    static Observations observations;
+    DetectorReport report;
+    if (expected.empty()) {
+        detector.detect(frame.picture.view(), observations, report);
+    } else {
+        detector.detect_around(frame.picture.view(), expected, observations, report);
+    }
+    return test::seen_dots(observations);
+}
+
+// What a tracker would predict: up to three pixels off.
+std::vector<ExpectedMarker> predictions(const BenchFrame& frame) {
+    test::SeededRandom random(1);
+    std::vector<ExpectedMarker> expected;
+    for (const test::TrueDot& dot : frame.dots) {
+        expected.push_back({static_cast<float>(dot.x_px + random.uniform(-2.0, 2.0)),
+                            static_cast<float>(dot.y_px + random.uniform(-2.0, 2.0)), 6.0F});
+    }
+    return expected;
 }
 
 std::vector<test::SeenDot> run_detector(Detector& detector, const BenchFrame& frame,
@@ -148,8 +175,29 @@ int main(int argc, char** argv) {
     add_scenes(frames);
     const auto detector = std::make_unique<Detector>();
     volatile std::size_t sink = 0;
+    // One for each polarity, as each camera of a rig has its own.
+    std::array<std::unique_ptr<Detector>, 2> settled;
+    for (const bool bright : {false, true}) {
+        settled[bright] = std::make_unique<Detector>();
+        DetectorConfig config;
+        config.polarity = bright ? MarkerPolarity::kBright : MarkerPolarity::kDark;
+        if (!settled[bright]->configure(config)) std::abort();
+    }
+    const auto make_predictions = [&] {
+        std::vector<std::vector<ExpectedMarker>> all;
+        for (const BenchFrame& frame : frames) all.push_back(predictions(frame));
+        return all;
+    };
+    const std::vector<std::vector<ExpectedMarker>> expected = make_predictions();
     const std::vector<Method> methods = {
-        {"detector, polarity given",
+        {"detector, whole image",
+         [&](const BenchFrame& f) { return run_settled(*settled[f.bright], f, {}); }},
+        {"detector, windows about predictions",
+         [&](const BenchFrame& f) {
+             return run_settled(*settled[f.bright], f,
+                                expected[static_cast<std::size_t>(&f - frames.data())]);
+         }},
+        {"detector, first frame",
          [&](const BenchFrame& f) {
              return run_detector(*detector, f, f.bright ? MarkerPolarity::kBright : MarkerPolarity::kDark);
          }},
