@@ -128,6 +128,7 @@ void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& rep
             c < pack_.camera_count && configured_ ? CameraStatus::kMissing : CameraStatus::kUnused;
     }
     sightings_.clear();
+    sightings_.capture_us = capture_us;
     named_ = NamedMarkers{};  // a tick without pictures has no markers, not the last ones
     named_.capture_us = capture_us;
     named_.count = configured_ ? pack_.marker_count : std::uint16_t{0};

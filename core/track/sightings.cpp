@@ -21,11 +21,19 @@ bool finite(const Vec3& x) {
 
 }  // namespace
 
+Sighting at_capture(const Sighting& sighting, const Vec3& velocity_mm_per_us) {
+    Sighting moved = sighting;
+    moved.point_mm -= sighting.delay_us * velocity_mm_per_us;
+    moved.delay_us = 0.0;
+    return moved;
+}
+
 void add_camera_view(const CameraModel& camera, std::span<const Observation> observations, double sigma_px,
                      double expected_depth_mm, SightingSet& set) {
     RIG_CHECK(set.view_count < kMaxCameras);
     const std::size_t view = set.view_count++;
     set.from_cameras = true;
+    set.row_delays = set.row_delays || camera.row_time_us > 0.0;
     const double sigma_mm = sigma_px * expected_depth_mm / (0.5 * (camera.fx_px + camera.fy_px));
     for (std::size_t i = 0; i < observations.size(); ++i) {
         Sighting sighting;
