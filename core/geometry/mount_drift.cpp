@@ -49,6 +49,13 @@ double shift_px(const CameraModel& camera, const Vec3& turn_rad) {
     return f * std::sqrt(turn_rad[0] * turn_rad[0] + turn_rad[1] * turn_rad[1]);
 }
 
+// Three marks that agree with each other do not jump together unless their camera did.
+bool is_jolt(const CameraModel& camera, const MountDriftConfig& config, const Vec3& turn_rad,
+             const MountDriftReport& report, const MountDriftState& state) {
+    return report.marks_used >= 3 && report.residual_px < 0.5 * config.jolt_px &&
+           shift_px(camera, turn_rad - state.turn_rad) > config.jolt_px;
+}
+
 void step_flag(const MountDriftConfig& config, double shift, MountDriftState& state) {
     const bool across = state.drifted ? shift < config.clear_px : shift > config.raise_px;
     state.frames_across = across ? static_cast<std::uint16_t>(state.frames_across + 1) : std::uint16_t{0};
@@ -71,9 +78,16 @@ CameraModel turned_camera(const CameraModel& camera, const Vec3& turn_rad) {
 
 void watch_mount(const CameraModel& camera, const MountDriftConfig& config,
                  std::span<const ReferenceMark> marks, MountDriftState& state, MountDriftReport& report) {
+    const Vec3 start_rad = state.turn_rad;
+    watch_mount(camera, config, marks, start_rad, state, report);
+}
+
+void watch_mount(const CameraModel& camera, const MountDriftConfig& config,
+                 std::span<const ReferenceMark> marks, const Vec3& start_rad, MountDriftState& state,
+                 MountDriftReport& report) {
     RIG_CHECK(marks.size() <= kMaxReferenceMarks);
     report = MountDriftReport{};
-    Vec3 turn = state.turn_rad;
+    Vec3 turn = start_rad;
     TurnSums sums = sum_up(camera, config, marks, turn);
     for (int step = 0; step < kSteps; ++step) {
         if (sums.count < 2 ||
@@ -89,7 +103,9 @@ void watch_mount(const CameraModel& camera, const MountDriftConfig& config,
     report.marks_used = sums.count;
     if (report.measured) {
         report.residual_px = std::sqrt(sums.squared_px / static_cast<double>(sums.count));
-        const double keep = state.started ? config.keep : 0.0;
+        report.frame_turn_rad = turn;
+        const bool anew = !state.started || is_jolt(camera, config, turn, report, state);
+        const double keep = anew ? 0.0 : config.keep;
         state.turn_rad = (keep * state.turn_rad + (1.0 - keep) * turn).eval();
         state.started = true;
         step_flag(config, shift_px(camera, state.turn_rad), state);

@@ -9,10 +9,15 @@
 
 #include "core/base/linalg.hpp"
 #include "core/geometry/camera_model.hpp"
+#include "core/limits.hpp"
 
 namespace rig {
 
-inline constexpr std::size_t kMaxReferenceMarks = 16;  // of a helmet; a bracket bends as a whole, few suffice
+// As a pack declares it.
+struct HelmetMark {
+    Vec3 headset_mm = Vec3::Zero();
+    std::uint8_t cameras = 0;  // bit c: camera c can see it
+};
 
 struct ReferenceMark {
     Vec3 headset_mm = Vec3::Zero();
@@ -21,11 +26,12 @@ struct ReferenceMark {
 };
 
 struct MountDriftConfig {
-    double sigma_px = 0.1;             // standard deviation of a mark's measured centre
-    double keep = 0.95;                // of the running estimate, a frame: about 20 frames are averaged
-    double mistaken_px = 8.0;          // a mark off its expected place by more is another dot
-    double raise_px = 0.5;             // mean displacement of the picture that raises the flag ...
-    double clear_px = 0.3;             // ... and that clears it
+    double sigma_px = 0.1;     // standard deviation of a mark's measured centre
+    double keep = 0.95;        // of the running estimate, a frame: about 20 frames are averaged
+    double mistaken_px = 8.0;  // a mark off its expected place by more is another dot
+    double jolt_px = 1.0;      // a turn that moves the picture by more at once starts the average anew
+    double raise_px = 0.5;     // mean displacement of the picture that raises the flag ...
+    double clear_px = 0.3;     // ... and that clears it
     std::uint16_t frames_before = 30;  // in a row on the other side, before the flag changes
 };
 
@@ -38,9 +44,10 @@ struct MountDriftState {
 
 struct MountDriftReport {
     std::uint16_t marks_used = 0;
-    bool measured = false;                // this frame had at least two marks, apart enough
-    bool drifted = false;                 // raise Fault::kRigMoved
-    Vec3 turn_rad = Vec3::Zero();         // small turn of the camera from its calibrated pose, camera axes
+    bool measured = false;         // this frame had at least two marks, apart enough
+    bool drifted = false;          // raise Fault::kRigMoved
+    Vec3 turn_rad = Vec3::Zero();  // small turn of the camera from its calibrated pose, camera axes; averaged
+    Vec3 frame_turn_rad = Vec3::Zero();   // this frame's own, valid when measured
     Mat3 covariance_rad2 = Mat3::Zero();  // of this frame's own turn, before averaging
     double shift_px = 0.0;                // how far the turn moves a point in the middle of the picture
     double residual_px = 0.0;             // rms distance of the marks from where the turned camera sees them
@@ -50,10 +57,14 @@ void reset_mount_drift(MountDriftState& state);
 
 // One frame of one camera. Least squares for a small turn of the camera about its centre: at a helmet's
 // distances a bent bracket turns a picture by pixels before it moves it. Marks whose distance from the pixel
-// expected so far exceeds mistaken_px are left out. Preconditions: at most kMaxReferenceMarks; all numbers
+// expected so far exceeds mistaken_px are left out. The search starts at state.turn_rad, or at start_rad when
+// the caller knows that the camera was knocked. Preconditions: at most kMaxReferenceMarks; all numbers
 // finite.
 void watch_mount(const CameraModel& camera, const MountDriftConfig& config,
                  std::span<const ReferenceMark> marks, MountDriftState& state, MountDriftReport& report);
+void watch_mount(const CameraModel& camera, const MountDriftConfig& config,
+                 std::span<const ReferenceMark> marks, const Vec3& start_rad, MountDriftState& state,
+                 MountDriftReport& report);
 
 // The camera as it sits now.
 [[nodiscard]] CameraModel turned_camera(const CameraModel& camera, const Vec3& turn_rad);

@@ -86,6 +86,21 @@ Result<void, PackError> read_cameras(const fb::Manifest& stored, PackManifest& o
     return {};
 }
 
+Result<void, PackError> read_reference_marks(const fb::Manifest& stored, PackManifest& out) {
+    const auto* marks = stored.reference_marks();
+    const std::size_t count = marks == nullptr ? 0 : marks->size();
+    if (count > kMaxReferenceMarks) return failure(PackError::kReferenceMarks);
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const fb::ReferenceMark& from = *marks->Get(i);
+        HelmetMark mark;
+        for (std::uint16_t a = 0; a < 3; ++a) mark.headset_mm[a] = from.headset_mm()->Get(a);
+        mark.cameras = from.cameras();
+        const bool reserved = from.reserved() != 0 || from.reserved2() != 0 || from.reserved3() != 0;
+        if (reserved || !out.reference_marks.push_back(mark)) return failure(PackError::kReferenceMarks);
+    }
+    return {};
+}
+
 // The verifier of FlatBuffers sees to the alignment of a vector's length, not to that of its structs. An
 // empty one has none to align.
 template <class T>
@@ -148,6 +163,7 @@ Result<void, PackError> read_counts(const fb::Manifest& stored, PackManifest& ou
     out.rbf_hull_near_widths = stored.rbf_hull_near_widths();
     out.rbf_hull_far_widths = stored.rbf_hull_far_widths();
     if (auto ok = read_cameras(stored, out); !ok) return failure(ok.error());
+    if (auto ok = read_reference_marks(stored, out); !ok) return failure(ok.error());
     out.memory_bytes = stored.memory_bytes();
     if (out.memory_bytes < out.total_bytes || out.memory_bytes > kMaxPackBytes)
         return failure(PackError::kMemory);
@@ -318,7 +334,7 @@ Result<PackManifest, PackError> read_manifest(ByteSpan bytes, HashFunction hash)
     if (raw.size() < 8 || !fb::VerifyManifestBuffer(verifier)) return failure(PackError::kManifestStructure);
     const fb::Manifest& stored = *fb::GetManifest(data);
     if (!is_aligned(stored.sections()) || !is_aligned(stored.cameras()) ||
-        !is_aligned(stored.camera_lenses()))
+        !is_aligned(stored.camera_lenses()) || !is_aligned(stored.reference_marks()))
         return failure(PackError::kManifestStructure);
 
     if (auto ok = read_identity(stored, out); !ok) return failure(ok.error());

@@ -11,6 +11,7 @@
 #include "core/base/bytes.hpp"
 #include "core/base/result.hpp"
 #include "core/geometry/camera_model.hpp"
+#include "core/geometry/mount_drift.hpp"
 #include "core/pack/pack_error.hpp"
 #include "core/pack/pack_format.hpp"
 
@@ -46,6 +47,7 @@ struct PackManifest {
     float rbf_hull_near_widths = 0.0F;
     float rbf_hull_far_widths = 0.0F;
     BoundedVector<CameraModel, kMaxCameras> cameras;
+    BoundedVector<HelmetMark, kMaxReferenceMarks> reference_marks;
     BoundedVector<PackSection, kSectionTypeCount> sections;  // in file order
 };
 

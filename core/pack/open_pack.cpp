@@ -265,6 +265,9 @@ void copy_scalars(const PackManifest& manifest, SolvePack& pack) {
     pack.rbf.centre_count = static_cast<std::uint16_t>(manifest.counts.rbf_centres);
     pack.camera_count = static_cast<std::uint8_t>(manifest.cameras.size());
     for (std::size_t c = 0; c < manifest.cameras.size(); ++c) pack.cameras[c] = manifest.cameras[c];
+    pack.reference_mark_count = static_cast<std::uint8_t>(manifest.reference_marks.size());
+    for (std::size_t i = 0; i < manifest.reference_marks.size(); ++i)
+        pack.reference_marks[i] = manifest.reference_marks[i];
 }
 
 }  // namespace
@@ -306,6 +309,15 @@ Result<void, PackError> check_camera(const CameraModel& camera) {
     return {};
 }
 
+Result<void, PackError> check_reference_mark(const HelmetMark& mark, std::size_t camera_count) {
+    for (int i = 0; i < 3; ++i) {
+        const double x = mark.headset_mm[i];
+        if (!is_finite(x) || x < -kMaxFaceMm || x > kMaxFaceMm) return failure(PackError::kReferenceMarks);
+    }
+    if (mark.cameras == 0 || (mark.cameras >> camera_count) != 0) return failure(PackError::kReferenceMarks);
+    return {};
+}
+
 Result<SolvePack, PackError> open_pack(ByteSpan bytes, HashFunction hash) {
     const Result<PackManifest, PackError> manifest = read_manifest(bytes, hash);
     if (!manifest) return failure(manifest.error());
@@ -314,6 +326,9 @@ Result<SolvePack, PackError> open_pack(ByteSpan bytes, HashFunction hash) {
     if (auto ok = check_scalars(*manifest); !ok) return failure(ok.error());
     for (const CameraModel& camera : manifest->cameras) {
         if (auto ok = check_camera(camera); !ok) return failure(ok.error());
+    }
+    for (const HelmetMark& mark : manifest->reference_marks) {
+        if (auto ok = check_reference_mark(mark, manifest->cameras.size()); !ok) return failure(ok.error());
     }
     SolvePack pack;
     copy_scalars(*manifest, pack);

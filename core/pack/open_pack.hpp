@@ -17,5 +17,7 @@ namespace rig {
 
 // The rule for one camera: kCameraIntrinsics or kCameraRotation. Any numbers are safe.
 [[nodiscard]] Result<void, PackError> check_camera(const CameraModel& camera);
+// The rule for one reference mark of a rig with so many cameras: kReferenceMarks. Any numbers are safe.
+[[nodiscard]] Result<void, PackError> check_reference_mark(const HelmetMark& mark, std::size_t camera_count);
 
 }  // namespace rig

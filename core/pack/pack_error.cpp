@@ -120,6 +120,8 @@ std::string_view pack_error_text(PackError error) {
             return "a camera's size, focal length, centre or distortion is implausible";
         case PackError::kCameraRotation:
             return "a camera's rotation is not a rotation or its position is implausible";
+        case PackError::kReferenceMarks:
+            return "its reference marks are too many, implausibly far, or of no camera it has";
         case PackError::kCount:
             break;
     }

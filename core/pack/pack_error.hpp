@@ -68,6 +68,7 @@ enum class PackError : std::uint8_t {
     kMarkerSetVariance,
     kCameraIntrinsics,
     kCameraRotation,
+    kReferenceMarks,
     kCount  // how many there are; never returned
 };
 

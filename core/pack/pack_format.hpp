@@ -29,9 +29,10 @@ namespace rig {
 
 inline constexpr std::array<char, 8> kPackMagic{'R', 'I', 'G', 'P', 'A', 'C', 'K', '1'};
 inline constexpr std::uint32_t kPackFormatVersion = 1;
-inline constexpr std::uint16_t kSolverAbi = 3;  // grows when core reads a pack's numbers differently
+inline constexpr std::uint16_t kSolverAbi = 4;  // grows when core reads a pack's numbers differently
 // A pack of this number still means the same: 2 brought the RBF's kernel and its fallback; 3 marker sets,
-// lenses that are rational or fisheye, and the time of a row; older packs have none of them.
+// lenses that are rational or fisheye, and the time of a row; 4 the helmet's reference marks, which an older
+// core would take for markers of the face; older packs have none of them.
 inline constexpr std::uint16_t kOldestSolverAbi = 1;
 inline constexpr std::size_t kPackHeaderBytes = 64;
 inline constexpr std::size_t kPackAlignment = 64;  // a cache line, and more than any vector load needs

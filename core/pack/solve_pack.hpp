@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "core/geometry/camera_model.hpp"
+#include "core/geometry/mount_drift.hpp"
 #include "core/limits.hpp"
 
 namespace rig {
@@ -123,6 +124,10 @@ struct SolvePack {
 
     std::uint8_t camera_count = 0;  // 0 for packs that only solve marker streams
     std::array<CameraModel, kMaxCameras> cameras{};
+
+    // Dots fixed to the helmet, which tell whether a camera still sits as calibrated; 0 on rigs without.
+    std::uint8_t reference_mark_count = 0;
+    std::array<HelmetMark, kMaxReferenceMarks> reference_marks{};
 
     std::array<std::string_view, kMaxShapes> shape_names{};
     std::array<std::string_view, kMaxMarkers> marker_names{};

@@ -9,6 +9,7 @@
 #include "core/base/linalg.hpp"
 #include "core/detect/observation.hpp"
 #include "core/filter/smoothing.hpp"
+#include "core/geometry/mount_drift.hpp"
 #include "core/image/view.hpp"
 
 namespace rig {
@@ -76,6 +77,8 @@ struct FrameReport {
     bool bootstrapped = false;  // identities were found anew in this frame
     std::array<std::int16_t, kMaxPoints>
         labels{};  // PointFrame input: the marker each point was taken for, -1 none
+    // how each camera sits on the helmet, by the pack's reference marks; nothing measured without them
+    std::array<MountDriftReport, kMaxCameras> mounts{};
     // stabilised, completed markers in the face frame, mm; [marker_count]
     std::array<Vec3, kMaxMarkers> face_markers_mm{};
     // 1 measured .. 0 unknown, and the expected distance from the truth of those inferred;

@@ -78,6 +78,7 @@ void Pipeline::configure_stages(const PipelineConfig& config) {
         const double distance = std::sqrt(centre.dot(centre));
         camera_depth_mm_[c] = distance > 1.0 ? distance : kNominalDepthMm;
     }
+    mounts_.fill(MountDriftState{});
     tracker_config_ = TrackerConfig{};
     tracker_config_.rate_hz = config.rate_hz;
     stabiliser_config_ = StabiliserConfig{};
@@ -128,6 +129,7 @@ void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& rep
             c < pack_.camera_count && configured_ ? CameraStatus::kMissing : CameraStatus::kUnused;
     }
     sightings_.clear();
+    sightings_.capture_us = capture_us;
     named_ = NamedMarkers{};  // a tick without pictures has no markers, not the last ones
     named_.capture_us = capture_us;
     named_.count = configured_ ? pack_.marker_count : std::uint16_t{0};
@@ -136,12 +138,23 @@ void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& rep
 void Pipeline::take_observations(std::size_t camera, std::span<const Observation> observations,
                                  FrameReport& report) {
     report.observations[camera] = static_cast<std::uint16_t>(observations.size());
-    add_camera_view(pack_.cameras[camera], observations, kCentreSigmaPx, camera_depth_mm_[camera],
-                    sightings_);
+    find_helmet_marks(pack_.cameras[camera], camera,
+                      std::span(pack_.reference_marks).first(pack_.reference_mark_count), observations,
+                      mark_config_, mounts_[camera], helmet_marks_);
+    report.mounts[camera] = helmet_marks_.drift;
+    add_camera_view(helmet_marks_.now, observations, kCentreSigmaPx, camera_depth_mm_[camera], sightings_,
+                    helmet_marks_.taken.span());
 }
 
 void Pipeline::track_sightings(FrameReport& report) {
     track(model_, tracker_config_, sightings_, tracker_, tracker_workspace_, named_, track_report_);
+    // From here on a match is an observation: some of those became no sighting.
+    for (std::size_t view = 0; sightings_.from_cameras && view < sightings_.view_count; ++view) {
+        for (std::int16_t& match : track_report_.matches[view]) {
+            if (match >= 0)
+                match = static_cast<std::int16_t>(sightings_.source[view][static_cast<std::size_t>(match)]);
+        }
+    }
     report.markers_seen = track_report_.seen;
     report.swaps_repaired = track_report_.swaps_repaired;
     report.names_rejected = track_report_.rejected;
@@ -345,6 +358,7 @@ void Pipeline::raise_faults(bool usable, const FrameReport& report, FaceState& s
         raise(state.cameras[c] == CameraStatus::kFrozen, Fault::kCameraFrozen);
         raise(state.cameras[c] == CameraStatus::kExposure, Fault::kExposure);
     }
+    for (const MountDriftState& mount : mounts_) raise(mount.drifted, Fault::kRigMoved);
     raise(configured_ && !usable, Fault::kMarkersLost);
     if (!usable) return;
     raise(state.state == TrackingState::kPartial, Fault::kMarkersMissing);

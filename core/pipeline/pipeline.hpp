@@ -15,6 +15,7 @@
 #include "core/pipeline/ladder.hpp"
 #include "core/solve/solver.hpp"
 #include "core/stabilise/stabiliser.hpp"
+#include "core/track/helmet_marks.hpp"
 #include "core/track/tracker.hpp"
 
 namespace rig {
@@ -50,7 +51,8 @@ class Pipeline {
     // Of the last step, for recording and pictures.
     [[nodiscard]] const Observations& observations(std::size_t camera) const { return observations_[camera]; }
     [[nodiscard]] const NamedMarkers& named_markers() const { return named_; }
-    // Which observation of each camera each marker was taken for, -1 none.
+    // Which observation of each camera each marker was taken for, -1 none; of a stream, which of its finite
+    // points.
     [[nodiscard]] const Matches& matches() const { return track_report_.matches; }
     // Of a regional pack, after a solved step: coefficients, residual and confidence of each region.
     [[nodiscard]] const RegionalOutput& regions() const { return solved_.regional; }
@@ -82,6 +84,9 @@ class Pipeline {
     std::array<Detector, kMaxCameras> detectors_;
     std::array<DetectorReport, kMaxCameras> detector_reports_{};
     std::array<Observations, kMaxCameras> observations_{};
+    HelmetMarkConfig mark_config_;
+    std::array<MountDriftState, kMaxCameras> mounts_{};
+    HelmetMarkOutput helmet_marks_;
     SightingSet sightings_;
 
     TrackerConfig tracker_config_;

@@ -15,12 +15,22 @@ constexpr double kMostPriorShare =
 
 using MarkerSightings = BoundedVector<Sighting, kMaxCameras>;
 
-void gather(const SightingSet& sightings, const Matches& matches, std::size_t marker, MarkerSightings& out) {
+// Where the marker was when the sighting's row was exposed, from where it is at the capture time.
+Vec3 at_row(const Vec3& position_mm, const Sighting& sighting, std::span<const Vec3> velocity_mm_per_us,
+            std::size_t marker) {
+    return velocity_mm_per_us.empty() ? position_mm
+                                      : Vec3{position_mm + sighting.delay_us * velocity_mm_per_us[marker]};
+}
+
+void gather(const SightingSet& sightings, const Matches& matches, std::span<const Vec3> velocity_mm_per_us,
+            std::size_t marker, MarkerSightings& out) {
     out.clear();
     for (std::size_t view = 0; view < sightings.view_count; ++view) {
         const std::int16_t at = matches[view][marker];
         if (at < 0) continue;
-        const bool kept = out.push_back(sightings.views[view][static_cast<std::size_t>(at)]);
+        const Sighting& sighting = sightings.views[view][static_cast<std::size_t>(at)];
+        const bool kept = out.push_back(
+            velocity_mm_per_us.empty() ? sighting : at_capture(sighting, velocity_mm_per_us[marker]));
         RIG_CHECK(kept);
     }
 }
@@ -32,15 +42,16 @@ double prior_information(const MarkerSightings& mine) {
 }
 
 // Takes away the match that lies farthest from the prediction.
-void drop_farthest(const Vec3& predicted_mm, const SightingSet& sightings, std::size_t marker,
-                   Matches& matches) {
+void drop_farthest(const Vec3& predicted_mm, const SightingSet& sightings,
+                   std::span<const Vec3> velocity_mm_per_us, std::size_t marker, Matches& matches) {
     std::size_t farthest = sightings.view_count;
     double largest = -1.0;
     for (std::size_t view = 0; view < sightings.view_count; ++view) {
         const std::int16_t at = matches[view][marker];
         if (at < 0) continue;
+        const Sighting& sighting = sightings.views[view][static_cast<std::size_t>(at)];
         const double d2 =
-            sightings.views[view][static_cast<std::size_t>(at)].squared_distance_mm2(predicted_mm);
+            sighting.squared_distance_mm2(at_row(predicted_mm, sighting, velocity_mm_per_us, marker));
         if (d2 > largest) {
             largest = d2;
             farthest = view;
@@ -52,13 +63,15 @@ void drop_farthest(const Vec3& predicted_mm, const SightingSet& sightings, std::
 }  // namespace
 
 void match_views(std::span<const Vec3> predicted_mm, const SightingSet& sightings, double gate_mm,
-                 MatchingWorkspace& workspace, Matches& matches) {
+                 MatchingWorkspace& workspace, Matches& matches, std::span<const Vec3> velocity_mm_per_us) {
+    RIG_CHECK(velocity_mm_per_us.empty() || velocity_mm_per_us.size() == predicted_mm.size());
     const std::size_t markers = predicted_mm.size();
     for (std::size_t view = 0; view < sightings.view_count; ++view) {
         const ViewSightings& seen = sightings.views[view];
         for (std::size_t k = 0; k < markers; ++k) {
             for (std::size_t j = 0; j < seen.size(); ++j) {
-                workspace.cost[k * seen.size() + j] = seen[j].squared_distance_mm2(predicted_mm[k]);
+                workspace.cost[k * seen.size() + j] =
+                    seen[j].squared_distance_mm2(at_row(predicted_mm[k], seen[j], velocity_mm_per_us, k));
             }
         }
         AssignmentProblem problem;
@@ -71,18 +84,19 @@ void match_views(std::span<const Vec3> predicted_mm, const SightingSet& sighting
 }
 
 void combine_views(std::span<const Vec3> predicted_mm, const SightingSet& sightings, double gap_limit_mm,
-                   Matches& matches, NamedMarkers& named) {
+                   Matches& matches, NamedMarkers& named, std::span<const Vec3> velocity_mm_per_us) {
+    RIG_CHECK(velocity_mm_per_us.empty() || velocity_mm_per_us.size() == predicted_mm.size());
     named.count = static_cast<std::uint16_t>(predicted_mm.size());
     MarkerSightings mine;
     for (std::size_t k = 0; k < predicted_mm.size(); ++k) {
         NamedMarker& marker = named.markers[k];
         marker = NamedMarker{};
-        gather(sightings, matches, k, mine);
+        gather(sightings, matches, velocity_mm_per_us, k, mine);
         if (mine.empty()) continue;
         Triangulation point = triangulate(mine.span(), predicted_mm[k], prior_information(mine));
         while (mine.size() > 1 && point.gap_mm > gap_limit_mm) {
-            drop_farthest(predicted_mm[k], sightings, k, matches);
-            gather(sightings, matches, k, mine);
+            drop_farthest(predicted_mm[k], sightings, velocity_mm_per_us, k, matches);
+            gather(sightings, matches, velocity_mm_per_us, k, mine);
             point = triangulate(mine.span(), predicted_mm[k], prior_information(mine));
         }
         marker.seen = true;

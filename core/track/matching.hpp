@@ -22,13 +22,16 @@ struct MatchingWorkspace {
 };
 
 // Optimal assignment per view, cost = squared distance of the prediction from the ray or point, nothing
-// beyond the gate. predicted_mm [marker_count], headset frame.
+// beyond the gate. predicted_mm [marker_count], headset frame, at the frame's capture time.
+// velocity_mm_per_us [marker_count] where a rolling shutter's rows count, else empty: each prediction is
+// moved to the exposure of the row it is compared with.
 void match_views(std::span<const Vec3> predicted_mm, const SightingSet& sightings, double gate_mm,
-                 MatchingWorkspace& workspace, Matches& matches);
+                 MatchingWorkspace& workspace, Matches& matches,
+                 std::span<const Vec3> velocity_mm_per_us = {});
 
-// Position and information of every matched marker. A sighting that disagrees with the other views of its
-// marker by more than gap_limit_mm is dropped from the match.
+// Position, at the frame's capture time, and information of every matched marker. A sighting that disagrees
+// with the other views of its marker by more than gap_limit_mm is dropped from the match.
 void combine_views(std::span<const Vec3> predicted_mm, const SightingSet& sightings, double gap_limit_mm,
-                   Matches& matches, NamedMarkers& named);
+                   Matches& matches, NamedMarkers& named, std::span<const Vec3> velocity_mm_per_us = {});
 
 }  // namespace rig

@@ -21,13 +21,26 @@ bool finite(const Vec3& x) {
 
 }  // namespace
 
+Sighting at_capture(const Sighting& sighting, const Vec3& velocity_mm_per_us) {
+    Sighting moved = sighting;
+    moved.point_mm -= sighting.delay_us * velocity_mm_per_us;
+    moved.delay_us = 0.0;
+    return moved;
+}
+
 void add_camera_view(const CameraModel& camera, std::span<const Observation> observations, double sigma_px,
-                     double expected_depth_mm, SightingSet& set) {
+                     double expected_depth_mm, SightingSet& set, std::span<const std::uint16_t> left_out) {
     RIG_CHECK(set.view_count < kMaxCameras);
     const std::size_t view = set.view_count++;
     set.from_cameras = true;
+    set.row_delays = set.row_delays || camera.row_time_us > 0.0;
     const double sigma_mm = sigma_px * expected_depth_mm / (0.5 * (camera.fx_px + camera.fy_px));
+    std::size_t next_left_out = 0;
     for (std::size_t i = 0; i < observations.size(); ++i) {
+        if (next_left_out < left_out.size() && left_out[next_left_out] == i) {
+            ++next_left_out;
+            continue;
+        }
         Sighting sighting;
         sighting.point_mm = camera.centre_mm;
         sighting.direction = pixel_ray(camera, Vec2{static_cast<double>(observations[i].x_px),

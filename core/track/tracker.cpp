@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/check.hpp"
+#include "core/base/elapsed.hpp"
 #include "core/base/math.hpp"
 
 namespace rig {
@@ -42,6 +43,26 @@ void predict_face(const ShapeModel& model, const ShapeFit& fit, const TrackerSta
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         w.predicted_mm[k] = fit.headset_position(model, k) + state.bias_mm[k];
     }
+}
+
+// What a rolling shutter's rows are corrected by, over one round of naming: empty when there is none, or when
+// the last frame is too far away to tell a velocity (F34: outside [0.25, 4] frames).
+std::span<const Vec3> row_velocity(const ShapeModel& model, const TrackerConfig& config,
+                                   const SightingSet& sightings, const TrackerState& state,
+                                   const ShapeFit* fitted, TrackerWorkspace& w) {
+    if (!sightings.row_delays || !config.correct_rows) return {};
+    const double frame_us = 1e6 / config.rate_hz;
+    const auto since_us = static_cast<double>(elapsed_us(state.capture_us, sightings.capture_us));
+    if (since_us < 0.25 * frame_us || since_us > 4.0 * frame_us) return {};
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        // The fitted face's step has less noise than a marker's own, and is a frame newer than the last one.
+        const Vec3 step =
+            fitted == nullptr
+                ? state.velocity_mm[k]
+                : Vec3{fitted->headset_position(model, k) - state.fit.headset_position(model, k)};
+        w.velocity_mm_per_us[k] = step / since_us;
+    }
+    return {w.velocity_mm_per_us.data(), model.marker_count};
 }
 
 double residual_of(const ShapeModel& model, const ShapeFit& fit, const TrackerState& state,
@@ -181,18 +202,21 @@ void track(const ShapeModel& model, const TrackerConfig& config, const SightingS
         report.bootstrapped = true;
     }
     predict_motion(model, config, state, w);
-    match_views(predicted(model, w), sightings, config.first_gate_mm, w.matching, w.matches);
+    std::span<const Vec3> velocity = row_velocity(model, config, sightings, state, nullptr, w);
+    match_views(predicted(model, w), sightings, config.first_gate_mm, w.matching, w.matches, velocity);
     w.first_matches = w.matches;
-    combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named);
+    combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
     fit_face(model, config, state, named, w);
 
     predict_face(model, w.next, state, w);
-    match_views(predicted(model, w), sightings, config.final_gate_mm, w.matching, w.matches);
-    combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named);
+    velocity = row_velocity(model, config, sightings, state, &w.next, w);
+    match_views(predicted(model, w), sightings, config.final_gate_mm, w.matching, w.matches, velocity);
+    combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
     fit_face(model, config, state, named, w);
     reject_outliers(model, config, state, w.next, named, w.matches, report);
     count_changes(model, sightings, w.first_matches, w.matches, report);
     remember(model, named, w.next, state, report);
+    state.capture_us = sightings.capture_us;
     report.matches = w.matches;
     notice_loss(model, config, state, report);
 }

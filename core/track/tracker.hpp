@@ -26,6 +26,7 @@ struct TrackerConfig {
     double pose_sigma_mm = 3.0;
     double expression_sigma = 0.6;  // per frame, in modes' standard deviations
     double velocity_keep = 0.6;     // of the last step, as the prediction of the next
+    bool correct_rows = true;       // move what a rolling shutter saw to the frame's capture time
     double lost_share = 0.25;       // fewer markers than this share for lost_frames means: start anew
     std::uint16_t lost_frames = 3;
     BootstrapConfig bootstrap;
@@ -34,6 +35,7 @@ struct TrackerConfig {
 struct TrackerState {
     bool tracking = false;
     std::uint16_t poor_frames = 0;
+    std::int64_t capture_us = 0;                  // of the last frame
     ShapeFit fit;                                 // of the last frame
     std::array<Vec3, kMaxMarkers> position_mm{};  // last known, headset frame
     std::array<Vec3, kMaxMarkers> velocity_mm{};  // per frame
@@ -50,6 +52,7 @@ struct TrackerWorkspace {
     Matches first_matches{};
     ShapeFit next;
     std::array<Vec3, kMaxMarkers> predicted_mm{};
+    std::array<Vec3, kMaxMarkers> velocity_mm_per_us{};  // during this frame; used with a rolling shutter
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> informations{};
 };

@@ -119,7 +119,8 @@ json pack_json(const OpenedPack& opened) {
                 {"rbf_centres", pack.rbf.centre_count},
                 {"rbf_kernel", rbf_kernel_name(pack.rbf.kernel)},
                 {"rbf_hull_widths", {pack.rbf.hull_near_widths, pack.rbf.hull_far_widths}}};
-    for (const char* list : {"boards", "sections", "cameras", "regions", "marker_sets", "shapes", "markers"})
+    for (const char* list :
+         {"boards", "sections", "cameras", "reference_marks", "regions", "marker_sets", "shapes", "markers"})
         out[list] = json::array();
     for (const std::string_view board : manifest.boards) out["boards"].push_back(board);
     for (const PackSection& section : manifest.sections) {
@@ -130,6 +131,14 @@ json pack_json(const OpenedPack& opened) {
     }
     for (std::size_t c = 0; c < pack.camera_count; ++c)
         out["cameras"].push_back(json(camera_json(pack.cameras[c])));
+    for (std::size_t i = 0; i < pack.reference_mark_count; ++i) {
+        const HelmetMark& mark = pack.reference_marks[i];
+        out["reference_marks"].push_back(
+            {{"headset_mm", {mark.headset_mm[0], mark.headset_mm[1], mark.headset_mm[2]}},
+             {"cameras", json::array()}});
+        for (std::size_t c = 0; c < pack.camera_count; ++c)
+            if ((mark.cameras >> c & 1) != 0) out["reference_marks"].back()["cameras"].push_back(c);
+    }
     for (std::size_t r = 0; r < pack.region_count; ++r)
         out["regions"].push_back(region_json(pack, pack.regions[r]));
     for (std::size_t f = 0; f < pack.marker_set_count; ++f) {
@@ -177,6 +186,7 @@ void print_identity(const PackInfoCommand& command, const OpenedPack& opened) {
     if (pack.region_count > 0) fmt::print("regions      {}\n", pack.region_count);
     if (pack.marker_set_count > 0) fmt::print("marker sets  {}\n", pack.marker_set_count);
     fmt::print("cameras      {}\n", pack.camera_count);
+    if (pack.reference_mark_count > 0) fmt::print("helmet marks {}\n", pack.reference_mark_count);
 }
 
 void print_tables(const OpenedPack& opened) {

@@ -177,6 +177,9 @@ Result<void, FileError> load_inputs(TrainCommand& command, Rig& rig, MarkerLayou
         auto cameras = load_cameras(command.cameras);
         if (!cameras) return failure(cameras.error());
         command.options.cameras = std::move(*cameras);
+        auto marks = load_reference_marks(command.cameras);
+        if (!marks) return failure(marks.error());
+        command.options.reference_marks = std::move(*marks);
     }
     return {};
 }

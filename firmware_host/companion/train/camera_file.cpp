@@ -135,6 +135,26 @@ std::vector<const json*> camera_entries(const json& file) {
     return entries;
 }
 
+// Bits of the cameras that a mark's entry names; 0 when one of them is unknown or none is named.
+std::uint8_t camera_bits(const json& entry, const std::vector<const json*>& cameras) {
+    const auto every = static_cast<std::uint8_t>((1U << cameras.size()) - 1U);
+    const auto named = entry.find("cameras");
+    if (named == entry.end()) return every;
+    if (!named->is_array()) return 0;
+    std::uint8_t bits = 0;
+    for (const json& letter : *named) {
+        std::uint8_t bit = 0;
+        for (std::size_t c = 0; c < cameras.size(); ++c) {
+            if (letter.is_string() && cameras[c]->is_object() &&
+                letter_of(*cameras[c], c) == letter.get<std::string>())
+                bit = static_cast<std::uint8_t>(1U << c);
+        }
+        if (bit == 0) return 0;
+        bits |= bit;
+    }
+    return bits;
+}
+
 }  // namespace
 
 const char* lens_name(LensModel lens) {
@@ -193,6 +213,47 @@ Result<std::vector<CameraModel>, FileError> parse_cameras(std::string_view text,
         cameras.push_back(camera);
     }
     return cameras;
+}
+
+Result<std::vector<HelmetMark>, FileError> parse_reference_marks(std::string_view text,
+                                                                 const std::filesystem::path& name) {
+    const json file = json::parse(text, nullptr, /*allow_exceptions=*/false);
+    if (file.is_discarded() || !file.is_object()) return file_failure(name, "is not a JSON object");
+    std::vector<HelmetMark> marks;
+    const auto list = file.find("reference_marks");
+    if (list == file.end()) return marks;
+    if (!list->is_array() || list->size() > kMaxReferenceMarks) {
+        return file_failure(
+            name, fmt::format("\"reference_marks\" is not a list of at most {} marks", kMaxReferenceMarks));
+    }
+    const std::vector<const json*> cameras = camera_entries(file);
+    if (cameras.size() > kMaxCameras) return file_failure(name, "has more cameras than a rig carries");
+    for (const json& entry : *list) {
+        const std::size_t number = marks.size() + 1;
+        HelmetMark mark;
+        EntryReader read(entry, file);
+        if (!entry.is_object())
+            return file_failure(name, fmt::format("reference mark number {} is not an object", number));
+        for (std::size_t i = 0; i < 3; ++i)
+            mark.headset_mm[static_cast<int>(i)] = read.element("headset_mm", i);
+        if (!read.fault().empty())
+            return file_failure(name, fmt::format("reference mark number {}: {}", number, read.fault()));
+        mark.cameras = camera_bits(entry, cameras);
+        if (!check_reference_mark(mark, cameras.size())) {
+            return file_failure(name, fmt::format("reference mark number {}: it is implausibly far, or "
+                                                  "\"cameras\" is not a list of this file's cameras",
+                                                  number));
+        }
+        marks.push_back(mark);
+    }
+    return marks;
+}
+
+Result<std::vector<HelmetMark>, FileError> load_reference_marks(const std::filesystem::path& path) {
+    const auto text = read_whole_text(path);
+    if (!text) return failure(text.error());
+    if (text->size() > kMaxCameraFileBytes) return file_failure(path, "is too large for a list of cameras");
+    return parse_reference_marks(*text, path);
 }
 
 Result<std::vector<CameraModel>, FileError> load_cameras(const std::filesystem::path& path) {

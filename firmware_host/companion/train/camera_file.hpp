@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/geometry/camera_model.hpp"
+#include "core/geometry/mount_drift.hpp"
 #include "firmware_host/companion/files/file_error.hpp"
 
 namespace rig::host {
@@ -24,6 +25,16 @@ namespace rig::host {
 // The same from text; `name` stands for the file in errors.
 [[nodiscard]] Result<std::vector<CameraModel>, FileError> parse_cameras(std::string_view text,
                                                                         const std::filesystem::path& name);
+
+// The top-level array "reference_marks" of a camera file, dots fixed to the helmet: "headset_mm" (3 numbers)
+// and, when not every camera can see the dot, "cameras", the letters of those that do. Empty when there is
+// none. At most kMaxReferenceMarks. Errors name the file and the mark.
+[[nodiscard]] Result<std::vector<HelmetMark>, FileError> load_reference_marks(
+    const std::filesystem::path& path);
+
+// The same from text; `name` stands for the file in errors.
+[[nodiscard]] Result<std::vector<HelmetMark>, FileError> parse_reference_marks(
+    std::string_view text, const std::filesystem::path& name);
 
 // The members of an entry that describe the camera itself, in the file's order.
 [[nodiscard]] nlohmann::ordered_json camera_json(const CameraModel& camera);

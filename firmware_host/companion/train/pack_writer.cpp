@@ -171,6 +171,18 @@ std::vector<fb::CameraLens> stored_lenses(const SolvePack& pack) {
     return lenses;
 }
 
+std::vector<fb::ReferenceMark> stored_marks(const SolvePack& pack) {
+    std::vector<fb::ReferenceMark> marks;
+    for (const HelmetMark& mark :
+         std::span(pack.reference_marks)
+             .first(std::min<std::size_t>(pack.reference_mark_count, kMaxReferenceMarks))) {
+        const std::array<double, 3> at{mark.headset_mm[0], mark.headset_mm[1], mark.headset_mm[2]};
+        marks.emplace_back(flatbuffers::span<const double, 3>(at.data(), at.size()), mark.cameras,
+                           std::uint8_t{0}, std::uint16_t{0}, 0U);
+    }
+    return marks;
+}
+
 // A version 8 UUID (RFC 9562: contents are ours to choose) of the contents.
 std::array<std::uint8_t, 16> uuid_of(const std::vector<SectionData>& sections, const PackIdentity& identity) {
     std::vector<std::byte> all;
@@ -202,10 +214,13 @@ std::vector<fb::Section> table_of(const std::vector<SectionData>& sections, std:
 }
 
 // The oldest core that takes this pack's numbers for what they are: one before 2 would take any kernel for
-// the Gaussian and never fall back, one before 3 any lens for a polynomial one, and refuse marker sets.
+// the Gaussian and never fall back, one before 3 any lens for a polynomial one, and refuse marker sets, one
+// before 4 the helmet's marks for markers.
 std::uint16_t oldest_core_for(const SolvePack& pack) {
     constexpr std::uint16_t kMarkerSetAndLensAbi = 3;
     constexpr std::uint16_t kRbfKernelAbi = 2;
+    constexpr std::uint16_t kReferenceMarkAbi = 4;
+    if (pack.reference_mark_count > 0) return kReferenceMarkAbi;
     if (pack.marker_set_count > 0 || !stored_lenses(pack).empty()) return kMarkerSetAndLensAbi;
     const bool gaussian = pack.rbf.kernel == RbfKernel::kGaussian && pack.rbf.hull_far_widths == 0.0F;
     return gaussian ? kOldestSolverAbi : kRbfKernelAbi;
@@ -226,6 +241,9 @@ std::vector<std::byte> manifest_of(const SolvePack& pack, const PackIdentity& id
     const auto camera_vector = builder.CreateVectorOfStructs(cameras);
     const std::vector<fb::CameraLens> lenses = stored_lenses(pack);
     const auto lens_vector = builder.CreateVectorOfStructs(lenses);
+    const std::vector<fb::ReferenceMark> marks = stored_marks(pack);
+    flatbuffers::Offset<flatbuffers::Vector<const fb::ReferenceMark*>> mark_vector;
+    if (!marks.empty()) mark_vector = builder.CreateVectorOfStructs(marks);
     const auto section_vector = builder.CreateVectorOfStructs(table);
     fb::ManifestBuilder manifest(builder);
     manifest.add_uuid(&uuid);
@@ -252,6 +270,7 @@ std::vector<std::byte> manifest_of(const SolvePack& pack, const PackIdentity& id
     manifest.add_rbf_hull_far_widths(pack.rbf.hull_far_widths);
     manifest.add_region_count(pack.region_count);
     if (!lenses.empty()) manifest.add_camera_lenses(lens_vector);
+    if (!marks.empty()) manifest.add_reference_marks(mark_vector);
     fb::FinishManifestBuffer(builder, manifest.Finish());
     const auto raw = std::as_bytes(std::span(builder.GetBufferPointer(), builder.GetSize()));
     return {raw.begin(), raw.end()};

@@ -149,6 +149,9 @@ SolvePack TrainedPack::view() const {
     for (std::size_t f = 0; f < out.marker_set_count; ++f) out.marker_sets[f] = marker_sets[f].view();
     out.camera_count = static_cast<std::uint8_t>(cameras.size());
     std::ranges::copy(cameras, out.cameras.begin());
+    out.reference_mark_count =
+        static_cast<std::uint8_t>(std::min(reference_marks.size(), kMaxReferenceMarks));
+    std::copy_n(reference_marks.begin(), out.reference_mark_count, out.reference_marks.begin());
     std::ranges::copy(shape_names, out.shape_names.begin());
     std::ranges::copy(marker_names, out.marker_names.begin());
     return out;
@@ -165,6 +168,7 @@ Result<TrainedPack, FileError> train(const Rig& rig, const MarkerLayout& layout,
     pack.rate_hz = options.rate_hz;
     pack.noise_mm = options.noise_mm;
     pack.cameras = options.cameras;
+    pack.reference_marks = options.reference_marks;
     for (const SparseShape& shape : rig.shapes) pack.shape_names.push_back(shape.name);
     for (const LayoutMarker& marker : layout.markers) pack.marker_names.push_back(marker.name);
     MarkerModel model = marker_model(rig, layout);

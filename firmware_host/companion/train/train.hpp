@@ -32,6 +32,7 @@ struct TrainOptions {
     SolverKind solver = SolverKind::kBoxQp;
     std::vector<Take> takes;  // shapes of the rig
     std::vector<CameraModel> cameras;
+    std::vector<HelmetMark> reference_marks;  // at most kMaxReferenceMarks
     double rate_hz = 60.0;
     double noise_mm = 0.1;
     TemporalPull temporal;
@@ -82,6 +83,7 @@ class TrainedPack {
     std::vector<std::string> shape_names, marker_names;
     std::vector<float> neutral_mm, basis_mm, weight_low, weight_high, prior_mean, prior_sigma, temporal_gamma;
     std::vector<CameraModel> cameras;
+    std::vector<HelmetMark> reference_marks;
     TrainedRbf rbf;
     std::vector<TrainedRegion> regions;
     std::vector<TrainedMarkerSet> marker_sets;

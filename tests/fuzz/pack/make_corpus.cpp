@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
         save(folder / "key_shapes", {.solver = kKeyShapes}, {}) &&
         save(folder / "examples", {.markers = 5, .shapes = 3, .solver = kExamples, .cameras = 0}, {}) &&
         save(folder / "marker_sets", {.cameras = 0, .marker_sets = true}, {}) &&
+        save(folder / "reference_marks", {.cameras = 2, .reference_marks = 3}, {}) &&
         save(folder / "four_cameras", {.markers = 5, .shapes = 1, .solver = kLeastSquares, .cameras = 4}, {});
     return ok ? 0 : 4;
 }

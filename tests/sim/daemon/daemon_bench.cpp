@@ -71,7 +71,7 @@ DaemonBench::DaemonBench(BenchOptions options)
       link_(pair.near_end(), clock, options_.faults, 0),
       pipeline_(std::make_unique<Pipeline>()),
       pace_(*this) {
-    const PaintedTake& take = painted_take();
+    const PaintedTake& take = *options_.take;
     wall.on_wait = [this] { host_acts(*this); };
     AppParts parts{clock, wall, {}, link_, watchdog, pace_, &button, &led, *pipeline_, nullptr, nullptr};
     for (std::size_t c = 0; c < 2; ++c) {

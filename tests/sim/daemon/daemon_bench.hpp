@@ -18,6 +18,7 @@
 #include "hal/sim/memory_frame_source.hpp"
 #include "hal/sim/memory_line.hpp"
 #include "hal/sim/memory_watchdog.hpp"
+#include "tests/sim/daemon/painted_take.hpp"
 
 namespace rig::test {
 
@@ -75,6 +76,7 @@ struct BenchOptions {
     std::string log_path;
     int frozen_frames = 3;
     FilterChoice smoothing;
+    const PaintedTake* take = &painted_take();  // outlives the bench
 };
 
 class DaemonBench {

@@ -38,7 +38,10 @@ void paint_disc(std::span<std::uint8_t> pixels, int width, int height, double cx
 
 }  // namespace
 
-PaintedTake::PaintedTake() : face_(options()), pack_(face_.pack()) {}
+PaintedTake::PaintedTake(PaintedTakeOptions chosen)
+    : options_(std::move(chosen)), face_(options()), pack_(face_.pack()) {
+    for (const HelmetMark& mark : options_.marks) pack_.reference_marks[pack_.reference_mark_count++] = mark;
+}
 
 void PaintedTake::paint(std::size_t camera, std::uint32_t frame, std::span<std::uint8_t> pixels) const {
     // Eight pixels a draw: grain of a few grey levels.
@@ -50,16 +53,23 @@ void PaintedTake::paint(std::size_t camera, std::uint32_t frame, std::span<std::
                 static_cast<std::uint8_t>(kSkin - 3.0 + static_cast<double>(bits >> (8 * k) & 7U));
         }
     }
-    const CameraModel& model = pack_.cameras[camera];
+    const bool knocked = camera == options_.knocked_camera && frame >= options_.knocked_from;
+    const CameraModel model =
+        knocked ? turned_camera(pack_.cameras[camera], options_.knock_rad) : pack_.cameras[camera];
     const auto weights = face_.weights_at(frame / kTakeRate_hz);
     const auto positions = face_.positions(weights);
-    for (std::size_t k = 0; k < positions.size(); ++k) {
-        const Vec3 to_camera = (model.centre_mm - positions[k]).normalized();
-        if (to_camera.dot(face_.outward(k)) < kGrazing) continue;
-        const ReferencePixel at = reference_project(model, positions[k]);
+    const auto paint_dot = [&](const Vec3& position) {
+        const ReferencePixel at = reference_project(model, position);
         const double radius = kDotRadius_mm * model.fx_px / static_cast<double>(at.z_mm);
         paint_disc(pixels, model.width_px, model.height_px, static_cast<double>(at.x_px),
                    static_cast<double>(at.y_px), radius);
+    };
+    for (std::size_t k = 0; k < positions.size(); ++k) {
+        const Vec3 to_camera = (model.centre_mm - positions[k]).normalized();
+        if (to_camera.dot(face_.outward(k)) >= kGrazing) paint_dot(positions[k]);
+    }
+    for (const HelmetMark& mark : options_.marks) {
+        if ((mark.cameras >> camera & 1U) != 0) paint_dot(mark.headset_mm);
     }
 }
 

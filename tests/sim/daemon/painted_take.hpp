@@ -14,9 +14,17 @@ namespace rig::test {
 
 inline constexpr double kTakeRate_hz = 60.0;
 
+struct PaintedTakeOptions {
+    std::vector<HelmetMark> marks;  // dots fixed to the helmet, in the pictures and in the pack
+    std::size_t knocked_camera = 0;
+    std::uint32_t knocked_from = 0;  // first frame in which it is turned
+    Vec3 knock_rad = Vec3::Zero();   // camera axes
+};
+
 class PaintedTake {
   public:
-    PaintedTake();
+    PaintedTake() : PaintedTake(PaintedTakeOptions{}) {}
+    explicit PaintedTake(PaintedTakeOptions options);
     [[nodiscard]] const SolvePack& pack() const { return pack_; }
     // The same bytes for the same camera and frame, always.
     void paint(std::size_t camera, std::uint32_t frame, std::span<std::uint8_t> pixels) const;
@@ -25,10 +33,14 @@ class PaintedTake {
             paint(camera, frame, pixels);
         };
     }
+    [[nodiscard]] std::vector<double> weights_at(std::uint32_t frame) const {
+        return face_.weights_at(frame / kTakeRate_hz);
+    }
     [[nodiscard]] int width_px() const { return pack_.cameras[0].width_px; }
     [[nodiscard]] int height_px() const { return pack_.cameras[0].height_px; }
 
   private:
+    PaintedTakeOptions options_;
     SyntheticFace face_;
     SolvePack pack_;
 };

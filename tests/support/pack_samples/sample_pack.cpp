@@ -65,6 +65,12 @@ SamplePack::SamplePack(const SamplePackSize& size) {
         camera.camera_from_headset << 1, 0, 0, 0, -1, 0, 0, 0, -1;
         camera.centre_mm = Vec3(10.0 * static_cast<double>(c), -40.0, 200.0);
     }
+    view.reference_mark_count = size.reference_marks;
+    for (std::size_t i = 0; i < size.reference_marks; ++i) {
+        view.reference_marks[i].headset_mm = Vec3(10.0 * static_cast<double>(i), 60.0, -7.25);
+        view.reference_marks[i].cameras =
+            i % 2 == 0 ? std::uint8_t{1} : static_cast<std::uint8_t>((1U << size.cameras) - 1U);
+    }
     if (is_regional(size.solver)) add_regions(size);
     if (size.marker_sets) add_marker_sets(size);
     if (size.solver != SolverKind::kRbf) return;

@@ -16,6 +16,7 @@ struct SamplePackSize {
     std::uint16_t rbf_centres = 3;
     std::uint8_t cameras = 1;
     std::uint16_t region_examples = 3;  // of the first region; the second has 2
+    std::uint8_t reference_marks = 0;   // seen by the first camera, every second one by all
     bool marker_sets = false;           // three: the whole face, all but the last marker, the first two
 };
 

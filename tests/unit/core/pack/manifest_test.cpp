@@ -326,7 +326,10 @@ TEST(ReadManifest, AsksForTheNewSolverInterfaceOnlyWhereItMatters) {
     SamplePack sets({.marker_sets = true});
     const AlignedBytes bytes(write_pack(sets.view, {}, sha256));
     EXPECT_EQ(read_manifest(bytes.span(), sha256)->solver_abi_min, 3);
-    EXPECT_EQ(kSolverAbi, 3);
+    SamplePack marks({.reference_marks = 1});
+    const AlignedBytes marked(write_pack(marks.view, {}, sha256));
+    EXPECT_EQ(read_manifest(marked.span(), sha256)->solver_abi_min, 4);
+    EXPECT_EQ(kSolverAbi, 4);
 }
 
 TEST(ReadManifest, ALensComesBackAndAnUnknownOneIsRefused) {

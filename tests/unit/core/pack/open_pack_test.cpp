@@ -274,6 +274,37 @@ TEST(OpenPack, RefusesImplausibleCameras) {
     with([&](CameraModel& c) { c.centre_mm[2] = 1e6; }, PackError::kCameraRotation);
 }
 
+TEST(OpenPack, ReferenceMarksComeBackAndImplausibleOnesAreRefused) {
+    const SamplePack sample({.cameras = 2, .reference_marks = kMaxReferenceMarks});
+    AlignedBytes bytes(write_pack(sample.view, {}, sha256));
+    const auto opened = open_pack(bytes.span(), sha256);
+    ASSERT_TRUE(opened.has_value()) << pack_error_text(opened.error());
+    ASSERT_EQ(opened->reference_mark_count, kMaxReferenceMarks);
+    for (std::size_t i = 0; i < kMaxReferenceMarks; ++i) {
+        EXPECT_EQ(opened->reference_marks[i].headset_mm, sample.view.reference_marks[i].headset_mm);
+        EXPECT_EQ(opened->reference_marks[i].cameras, i % 2 == 0 ? 1 : 3);
+    }
+    for (std::size_t i = 0; i < bytes.span().size(); ++i) {
+        bytes[i] ^= std::byte{1} << (i % 8);
+        ASSERT_FALSE(open_pack(bytes.span(), sha256).has_value()) << i;
+        bytes[i] ^= std::byte{1} << (i % 8);
+    }
+    const auto with = [](auto change) {
+        SamplePack bad({.reference_marks = 2});
+        change(bad.view.reference_marks[1]);
+        expect_refused(bad.view, PackError::kReferenceMarks);
+    };
+    with([](HelmetMark& m) { m.headset_mm[0] = std::numeric_limits<double>::quiet_NaN(); });
+    with([](HelmetMark& m) { m.headset_mm[2] = std::numeric_limits<double>::infinity(); });
+    with([](HelmetMark& m) { m.headset_mm[1] = -2e4; });
+    with([](HelmetMark& m) { m.cameras = 0; });
+    with([](HelmetMark& m) { m.cameras = 2; });  // the pack has one camera
+    with([](HelmetMark& m) { m.cameras = 255; });
+    SamplePack blind({.cameras = 0});
+    blind.view.reference_mark_count = 1;
+    expect_refused(blind.view, PackError::kReferenceMarks);
+}
+
 TEST(OpenPack, RefusesBadNames) {
     const auto with = [](std::string_view shape, std::string_view marker, PackError error) {
         SamplePack sample({});

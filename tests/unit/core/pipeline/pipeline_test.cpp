@@ -388,6 +388,87 @@ TEST(Pipeline, ACameraThatIsGoneMakesItPartial) {
         EXPECT_EQ(states[static_cast<std::size_t>(i)], TrackingState::kPartial);
 }
 
+// A frame of both cameras as they sit, helmet marks among the dots.
+void step_with_marks(Scene& s, std::span<const HelmetMark> marks, const Vec3& turn_rad) {
+    const std::vector<Vec3> truth = s.face.positions(s.face.weights_at(s.frame / 60.0));
+    std::array<std::vector<Observation>, 2> views;
+    ObservationFrame frame;
+    frame.capture_us = s.now();
+    frame.camera_count = 2;
+    for (std::size_t c = 0; c < 2; ++c) {
+        const CameraModel camera = s.face.pack().cameras[c];
+        const CameraModel sits = c == 1 ? turned_camera(camera, turn_rad) : camera;
+        const auto add = [&](const Vec3& at) {
+            const test::ReferencePixel p = test::reference_project(sits, at);
+            views[c].push_back({static_cast<float>(static_cast<double>(p.x_px) + s.random.normal(0.0, 0.1)),
+                                static_cast<float>(static_cast<double>(p.y_px) + s.random.normal(0.0, 0.1)),
+                                8.0F, 0.5F, 0.9F});
+        };
+        for (const HelmetMark& mark : marks) add(mark.headset_mm);
+        for (const Vec3& at : truth) add(at);
+        frame.status[c] = CameraStatus::kGood;
+        frame.cameras[c] = views[c];
+    }
+    s.pipeline->step(frame, s.state, s.report);
+    ++s.frame;
+}
+
+TEST(Pipeline, AKnockedCameraIsReportedAndItsMarksAreNoMarkersOfTheFace) {
+    test::SyntheticFaceOptions options;
+    options.camera_count = 2;
+    Scene s({}, options);
+    SolvePack pack = s.face.pack();
+    for (const double x : {-70.0, 0.0, 70.0})
+        pack.reference_marks[pack.reference_mark_count++] = {Vec3{x, 66.0, 12.0}, 3};
+    ASSERT_TRUE(s.pipeline->configure(pack, {}).has_value());
+    const std::span<const HelmetMark> marks = std::span(pack.reference_marks).first(3);
+    const Vec3 turn{0.012, -0.009, 0.005};
+    int raised = -1;
+    for (int i = 0; i < 200; ++i) {
+        step_with_marks(s, marks, i < 60 ? Vec3{Vec3::Zero()} : turn);
+        const bool fault = (s.state.faults & fault_bit(Fault::kRigMoved)) != 0;
+        if (fault && raised < 0) raised = i;
+        EXPECT_TRUE(s.report.mounts[0].measured && s.report.mounts[1].measured) << i;
+        EXPECT_EQ(s.report.mounts[1].drifted, fault);
+        EXPECT_FALSE(s.report.mounts[0].drifted);
+        EXPECT_EQ(s.report.observations[0], 63) << "what was seen is told as it was seen";
+        for (std::size_t c = 0; c < 2; ++c) {
+            for (std::size_t k = 0; k < 60; ++k) {
+                const int at = s.pipeline->matches()[c][k];
+                // Observation 3 + k is marker k.
+                if (at >= 0) {
+                    ASSERT_EQ(at, static_cast<int>(k) + 3) << i;
+                }
+            }
+        }
+    }
+    EXPECT_GE(raised, 89);
+    EXPECT_LE(raised, 120);
+    EXPECT_LT((s.report.mounts[1].turn_rad - turn).norm(), 1e-3);
+    EXPECT_LT(s.weight_rms(), 0.05);
+    s.idle();
+    EXPECT_NE(s.state.faults & fault_bit(Fault::kRigMoved), 0U) << "a tick without pictures mends no bracket";
+    ASSERT_TRUE(s.pipeline->configure(pack, {}).has_value());
+    s.idle();
+    EXPECT_EQ(s.state.faults & fault_bit(Fault::kRigMoved), 0U);
+}
+
+TEST(Pipeline, ARigWithoutMarksSolvesToTheSameBitsAsOneWhoseMarksNobodySees) {
+    test::SyntheticFaceOptions options;
+    options.camera_count = 2;
+    Scene plain({}, options);
+    Scene marked({}, options);
+    SolvePack pack = marked.face.pack();
+    pack.reference_marks[pack.reference_mark_count++] = {Vec3{300.0, 200.0, 100.0}, 3};
+    ASSERT_TRUE(marked.pipeline->configure(pack, {}).has_value());
+    for (int i = 0; i < 40; ++i) {
+        step_with_marks(plain, {}, Vec3::Zero());
+        step_with_marks(marked, {}, Vec3::Zero());
+        ASSERT_EQ(plain.state.weights, marked.state.weights) << i;
+        EXPECT_FALSE(plain.report.mounts[0].measured);
+    }
+}
+
 // Dark discs on grey skin where the projection puts them.
 std::vector<std::uint8_t> draw(const CameraModel& camera, const std::vector<Observation>& dots) {
     std::vector<std::uint8_t> pixels(static_cast<std::size_t>(camera.width_px * camera.height_px), 170);

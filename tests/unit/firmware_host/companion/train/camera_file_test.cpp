@@ -102,6 +102,49 @@ TEST(ParseCameras, SurvivesEveryTruncation) {
     }
 }
 
+TEST(ParseReferenceMarks, TakesPlacesAndTheCamerasThatSeeThem) {
+    const std::string cameras = R"("cameras":[{"camera":"l",)" + kLens + "," + kPose + R"(},{"camera":"r",)" +
+                                kLens + "," + kPose + "}]";
+    const auto marks = parse_reference_marks("{" + cameras +
+                                                 R"(,"reference_marks":[)"
+                                                 R"({"headset_mm":[-60,55.5,20]},)"
+                                                 R"({"headset_mm":[1,2,3],"cameras":["r"]},)"
+                                                 R"({"headset_mm":[4,5,6],"cameras":["r","l"]}]})",
+                                             "cameras.json");
+    ASSERT_TRUE(marks.has_value()) << marks.error().message;
+    ASSERT_EQ(marks->size(), 3U);
+    EXPECT_EQ((*marks)[0].headset_mm, Vec3(-60.0, 55.5, 20.0));
+    EXPECT_EQ((*marks)[0].cameras, 3) << "all, when none is named";
+    EXPECT_EQ((*marks)[1].cameras, 2);
+    EXPECT_EQ((*marks)[2].cameras, 3);
+    const auto none = parse_reference_marks("{" + cameras + "}", "cameras.json");
+    ASSERT_TRUE(none.has_value());
+    EXPECT_TRUE(none->empty());
+}
+
+TEST(ParseReferenceMarks, NamesEachFault) {
+    const auto fault = [](const std::string& list) {
+        const auto marks = parse_reference_marks(
+            R"({"cameras":[{"camera":"l",)" + kLens + "," + kPose + R"(}],"reference_marks":)" + list + "}",
+            "c");
+        EXPECT_FALSE(marks.has_value()) << list;
+        return marks ? std::string() : marks.error().message;
+    };
+    EXPECT_NE(fault("{}").find("not a list of at most 16"), std::string::npos);
+    EXPECT_NE(fault("[7]").find("number 1 is not an object"), std::string::npos);
+    EXPECT_NE(fault(R"([{"headset_mm":[0,0,0]},{}])").find("number 2: \"headset_mm\" is missing"),
+              std::string::npos);
+    EXPECT_NE(fault(R"([{"headset_mm":[0,0]}])").find("is not 3 numbers"), std::string::npos);
+    EXPECT_NE(fault(R"([{"headset_mm":[0,0,1e9]}])").find("implausibly far"), std::string::npos);
+    for (const char* cameras : {R"(["z"])", "[]", R"("l")", "[1]"}) {
+        EXPECT_NE(fault(R"([{"headset_mm":[0,0,0],"cameras":)" + std::string(cameras) + "}]").find("cameras"),
+                  std::string::npos);
+    }
+    std::string many = "[";
+    for (int i = 0; i < 17; ++i) many += std::string(i == 0 ? "" : ",") + R"({"headset_mm":[0,0,0]})";
+    EXPECT_NE(fault(many + "]").find("at most 16"), std::string::npos);
+}
+
 TEST(LoadCameras, ReadsTheRecordedOnes) {
     RIG_SHARED_DATA_OR_SKIP(path, "images/cameras.json");
     const auto cameras = load_cameras(path);
