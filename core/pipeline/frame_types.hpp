@@ -20,6 +20,7 @@ struct PipelineConfig {
     bool stabilise = true;  // false: input is already in the face frame
     bool filter = true;     // smoothing and recovery blends; a temporal prior in the pack stays on either way
     FilterChoice smoothing;  // per shape, when `filter` is set
+    bool windows = true;  // look for a tracked face's markers where they should be, not in the whole picture
     LossPolicy loss_policy = LossPolicy::kHold;
     MarkerPolarity polarity = MarkerPolarity::kAuto;
     double rate_hz = 60.0;

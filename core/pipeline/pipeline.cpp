@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kCentreSigmaPx = 0.15;  // of a detected centre: measured on rendered frames, blur and noise
 constexpr double kNominalDepthMm = 200.0;   // helmet camera to face, when the calibration does not tell
+constexpr std::uint32_t kWholeImageEvery = 32;  // frames, of each camera
 constexpr std::int64_t kDecayUs = 400'000;  // to the rest pose, policy kDecay
 constexpr double kSlipAlarmRad = 0.07;      // about 4 degrees: re-seat the rig
 constexpr double kSlipAlarmMm = 8.0;
@@ -135,6 +136,25 @@ void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& rep
     named_.count = configured_ ? pack_.marker_count : std::uint16_t{0};
 }
 
+// A face that is tracked is looked for where it should be; now and then everywhere, one camera after another,
+// so that what was taken for a marker has to be the best in the whole picture.
+void Pipeline::find_markers(std::size_t camera, const ImageView& image) {
+    Detector& detector = detectors_[camera];
+    const bool due = (sequence_ + camera * kWholeImageEvery / kMaxCameras) % kWholeImageEvery == 0;
+    if (!tracker_.tracking || due || !config_.windows) {
+        if (!tracker_.tracking) detector.forget_size();
+        detector.detect(image, observations_[camera], detector_reports_[camera]);
+        return;
+    }
+    const MarkerPrediction prediction{
+        predict_markers(model_, tracker_config_, tracker_, tracker_workspace_),
+        std::span(tracker_.missed).first(pack_.marker_count),
+        std::span(track_report_.matches[camera]).first(pack_.marker_count)};
+    expect_markers(turned_camera(pack_.cameras[camera], mounts_[camera].turn_rad), camera, prediction,
+                   std::span(pack_.reference_marks).first(pack_.reference_mark_count), expected_);
+    detector.detect_around(image, expected_.span(), observations_[camera], detector_reports_[camera]);
+}
+
 void Pipeline::take_observations(std::size_t camera, std::span<const Observation> observations,
                                  FrameReport& report) {
     report.observations[camera] = static_cast<std::uint16_t>(observations.size());
@@ -169,7 +189,7 @@ void Pipeline::step(const FrameSet& frame, FaceState& state, FrameReport& report
         CameraStatus status = c < frame.camera_count ? frame.status[c] : CameraStatus::kMissing;
         if (usable_status(status) && frame.images[c].empty()) status = CameraStatus::kMissing;
         if (usable_status(status)) {
-            detectors_[c].detect(frame.images[c], observations_[c], detector_reports_[c]);
+            find_markers(c, frame.images[c]);
             if (detector_reports_[c].exposure != 0) status = CameraStatus::kExposure;
             state.faults |= detector_reports_[c].faults;
             any = true;

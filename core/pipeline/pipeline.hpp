@@ -11,6 +11,7 @@
 #include "core/filter/smoothing.hpp"
 #include "core/infer/inference.hpp"
 #include "core/pack/solve_pack.hpp"
+#include "core/pipeline/expected_markers.hpp"
 #include "core/pipeline/frame_types.hpp"
 #include "core/pipeline/ladder.hpp"
 #include "core/solve/solver.hpp"
@@ -64,6 +65,7 @@ class Pipeline {
     void configure_stages(const PipelineConfig& config);
     void forget();
     void begin(std::int64_t capture_us, FaceState& state, FrameReport& report);
+    void find_markers(std::size_t camera, const ImageView& image);
     void take_observations(std::size_t camera, std::span<const Observation> observations,
                            FrameReport& report);
     void track_sightings(FrameReport& report);
@@ -84,6 +86,7 @@ class Pipeline {
     std::array<Detector, kMaxCameras> detectors_;
     std::array<DetectorReport, kMaxCameras> detector_reports_{};
     std::array<Observations, kMaxCameras> observations_{};
+    ExpectedMarkers expected_;
     HelmetMarkConfig mark_config_;
     std::array<MountDriftState, kMaxCameras> mounts_{};
     HelmetMarkOutput helmet_marks_;

@@ -185,6 +185,13 @@ void reset_tracker(TrackerState& state) {
     state = TrackerState{};
 }
 
+std::span<const Vec3> predict_markers(const ShapeModel& model, const TrackerConfig& config,
+                                      const TrackerState& state, TrackerWorkspace& w) {
+    RIG_CHECK(state.tracking);
+    predict_motion(model, config, state, w);
+    return predicted(model, w);
+}
+
 void track(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings,
            TrackerState& state, TrackerWorkspace& w, NamedMarkers& named, TrackerReport& report) {
     report = TrackerReport{};

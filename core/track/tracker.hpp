@@ -69,6 +69,11 @@ struct TrackerReport {
 
 void reset_tracker(TrackerState& state);
 
+// Where each marker should be in the next frame, headset frame; valid until the workspace is used again.
+// Precondition: state.tracking.
+[[nodiscard]] std::span<const Vec3> predict_markers(const ShapeModel& model, const TrackerConfig& config,
+                                                    const TrackerState& state, TrackerWorkspace& workspace);
+
 // One tick of unnamed sightings.
 void track(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings,
            TrackerState& state, TrackerWorkspace& workspace, NamedMarkers& named, TrackerReport& report);
