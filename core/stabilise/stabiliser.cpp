@@ -11,6 +11,7 @@ namespace {
 // mm and rad: a pose that must not move. Its square beside a mode's prior of 1 has to stay within the 14
 // digits that the Cholesky factor asks for, or the fit is refused and nothing is inferred.
 constexpr double kHeldSigma = 1e-6;
+constexpr double kStepSigmas = 1e-2;  // of the last step; what is left is a tenth of it
 
 std::size_t fill_input(const NamedMarkers& named, StabiliserWorkspace& w) {
     std::size_t seen = 0;
@@ -62,7 +63,7 @@ bool moved_too_far(const StabiliserConfig& config, const Rigid& from, const Rigi
 
 // `fit` is the start on entry and the answer on return.
 void fit_pose(const ShapeModel& model, const StabiliserConfig& config, std::size_t count,
-              const StabiliserState& state, StabiliserWorkspace& w, ShapeFit& fit, StabiliserReport& report) {
+              StabiliserState& state, StabiliserWorkspace& w, ShapeFit& fit, StabiliserReport& report) {
     const std::span<const Vec3> positions(w.positions_mm.data(), count);
     const std::span<const Mat3> informations(w.informations.data(), count);
     const ShapeFit start = fit;
@@ -71,13 +72,15 @@ void fit_pose(const ShapeModel& model, const StabiliserConfig& config, std::size
         creeping.pose = state.fit.pose;
         creeping.rotation_sigma_rad = config.step_rotation_sigma_rad;
         creeping.translation_sigma_mm = config.step_translation_sigma_mm;
-        fit_shape(model, positions, informations, creeping, config.iterations, start, w.fit, fit);
+        fit_shape(model, positions, informations, creeping, {config.steps, kStepSigmas}, start, state.memory, w.fit,
+                  fit);
         report.ok = fit.ok;
         report.jolt = !fit.ok || moved_too_far(config, start.pose, fit.pose);
         if (!report.jolt) return;
     }
-    const int iterations = state.warm ? config.iterations : config.first_iterations;
-    fit_shape(model, positions, informations, wide_prior(config), iterations, start, w.fit, fit);
+    const int steps = state.warm ? config.steps : config.first_steps;
+    fit_shape(model, positions, informations, wide_prior(config), {steps, kStepSigmas}, start, state.memory,
+              w.fit, fit);
     report.ok = fit.ok;
 }
 

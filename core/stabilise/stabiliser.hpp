@@ -8,7 +8,7 @@
 #include <array>
 #include <cstdint>
 
-#include "core/geometry/shape_model.hpp"
+#include "core/geometry/shape_fit.hpp"
 #include "core/stabilise/stabilised_markers.hpp"
 #include "core/track/named_markers.hpp"
 
@@ -24,13 +24,14 @@ struct StabiliserConfig {
     double step_rotation_sigma_rad = 0.0005;
     double step_translation_sigma_mm = 0.05;
     double jolt_sigmas = 2.5;
-    int first_iterations = 6;  // Gauss-Newton steps from a cold start
-    int iterations = 3;        // ... from the previous frame
+    int first_steps = 10;  // of the fit, at most: from a cold start
+    int steps = 6;         // ... from the previous frame
 };
 
 struct StabiliserState {
     bool warm = false;
     ShapeFit fit;  // of the previous frame
+    ShapeFitMemory memory;
 };
 
 struct StabiliserWorkspace {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "core/geometry/shape_model.hpp"
+#include "core/geometry/shape_fit.hpp"
 #include "core/track/assignment.hpp"
 #include "core/track/named_markers.hpp"
 #include "core/track/sightings.hpp"

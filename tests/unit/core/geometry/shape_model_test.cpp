@@ -1,5 +1,7 @@
 #include "core/geometry/shape_model.hpp"
 
+#include "core/geometry/shape_fit.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
