@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/base/check.hpp"
+#include "core/base/dense.hpp"
 #include "core/base/math.hpp"
 
 namespace rig {
@@ -107,7 +108,8 @@ double objective_of(const FitProblem& p, const ShapeFit& fit, const ShapeFitWork
 
 bool prepare_factor(const FitProblem& p, const ShapeFit& fit, const ShapeTolerance& tolerance,
                     const ShapeFitWorkspace& w, ShapeFitMemory& memory) {
-    if (follow_markers(p.model, fit.pose.rotation, w.face_mm, p.informations, tolerance, memory.information)) {
+    if (follow_markers(p.model, fit.pose.rotation, w.face_mm, p.informations, tolerance,
+                       memory.information)) {
         memory.factor.modes_done = false;
     }
     return factor_shape(memory.information, p.model.mode_count, p.prior_information, memory.factor);
@@ -137,7 +139,8 @@ bool iterate(const FitProblem& p, const ShapeFitLimits& limits, ShapeFitMemory& 
     for (int step = 0; step < limits.steps; ++step) {
         fill_right(p, fit, w);
         double squared = solve_shape(memory.factor, p.model.mode_count, w.right.data());
-        const bool stale = step > 0 && squared > kStaleShare * before && squared > kStaleSigmas * kStaleSigmas;
+        const bool stale =
+            step > 0 && squared > kStaleShare * before && squared > kStaleSigmas * kStaleSigmas;
         if (stale || !is_finite(squared)) {
             if (!prepare_anew(p, fit, w, memory)) return false;
             fill_right(p, fit, w);
@@ -187,6 +190,29 @@ void fit_shape(const ShapeModel& model, std::span<const Vec3> positions_mm,
                ShapeFitWorkspace& w, ShapeFit& fit) {
     forget(w.memory);
     fit_shape(model, positions_mm, informations, prior, {steps, kLeastStepSigmas}, start, w.memory, w, fit);
+}
+
+Mat3 fitted_covariance(const ShapeModel& model, std::size_t marker, const ShapeFitMemory& memory,
+                       ShapeFitWorkspace& w) {
+    const std::size_t modes = model.mode_count;
+    const Vec3& q = w.face_mm[marker];
+    const double turns[3][3] = {{0.0, q[2], -q[1]}, {-q[2], 0.0, q[0]}, {q[1], -q[0], 0.0}};
+    const float* rows = model.rows.data() + 3 * marker * kMaxModes;
+    Mat3 covariance;
+    for (std::size_t a = 0; a < 3; ++a) {
+        for (std::size_t j = 0; j < modes; ++j) w.right[j] = static_cast<double>(rows[a * kMaxModes + j]);
+        for (std::size_t c = 0; c < 3; ++c) {
+            w.right[modes + c] = turns[a][c];
+            w.right[modes + 3 + c] = a == c ? 1.0 : 0.0;
+        }
+        const double own = solve_shape(memory.factor, modes, w.right.data());
+        for (std::size_t b = 0; b < 3; ++b) {
+            double sum = dot(rows + b * kMaxModes, w.right.data(), modes) + w.right[modes + 3 + b];
+            for (std::size_t c = 0; c < 3; ++c) sum += turns[b][c] * w.right[modes + c];
+            covariance(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = a == b ? own : sum;
+        }
+    }
+    return covariance;
 }
 
 }  // namespace rig

@@ -42,11 +42,10 @@ void forget(ShapeFitMemory& memory);
 
 struct ShapeFitWorkspace {
     static constexpr std::size_t kSize = ShapeInformation::kSize;
-    ShapeFitMemory memory;  // of fits without one of their own
+    ShapeFitMemory memory;                       // of fits without one of their own
     std::array<Vec3, kMaxMarkers> face_mm{};     // the fitted face: [marker_count], seen or not
     std::array<Vec3, kMaxMarkers> headset_mm{};  // ... as it sits under the helmet
     std::array<double, kSize + kLaneFloats> right{};
-    std::array<double, kSize + kLaneFloats> scratch{};
     std::array<float, kMaxModes> coefficients{};
     std::array<float, padded(kMaxRows)> moved_mm{};  // what the modes add to the mean
     std::array<float, kMaxRows> pull{};              // information times residual, face frame
@@ -72,5 +71,10 @@ void fit_shape(const ShapeModel& model, std::span<const Vec3> positions_mm,
 void fit_shape(const ShapeModel& model, std::span<const Vec3> positions_mm,
                std::span<const Mat3> informations, const ShapePrior& prior, int steps, const ShapeFit& start,
                ShapeFitWorkspace& workspace, ShapeFit& fit);
+
+// How well the fit knows a fitted marker, seen or not: its covariance in the face frame, mm^2, after
+// fit_shape() with this memory and workspace. To a tenth: from the matrix that is kept.
+[[nodiscard]] Mat3 fitted_covariance(const ShapeModel& model, std::size_t marker,
+                                     const ShapeFitMemory& memory, ShapeFitWorkspace& workspace);
 
 }  // namespace rig

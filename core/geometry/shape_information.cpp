@@ -27,7 +27,11 @@ PoseColumns pose_columns(const Vec3& q_mm) {
     const auto x = static_cast<float>(q_mm[0]);
     const auto y = static_cast<float>(q_mm[1]);
     const auto z = static_cast<float>(q_mm[2]);
-    return {{{0.0F, -z, y}, {z, 0.0F, -x}, {-y, x, 0.0F}, {1.0F, 0.0F, 0.0F}, {0.0F, 1.0F, 0.0F},
+    return {{{0.0F, -z, y},
+             {z, 0.0F, -x},
+             {-y, x, 0.0F},
+             {1.0F, 0.0F, 0.0F},
+             {0.0F, 1.0F, 0.0F},
              {0.0F, 0.0F, 1.0F}}};
 }
 
@@ -110,15 +114,15 @@ bool factor_shape(const ShapeInformation& information, std::size_t mode_count,
         const float* source = information.matrix.data() + i * kStride;
         for (std::size_t c = i; c < size; ++c) row[c] = static_cast<double>(source[c]);
         for (std::size_t c = size; c < size + kLaneFloats; ++c) row[c] = 0.0;
-        row[i] += i < mode_count ? prior.by_mode
-                                 : (i < mode_count + 3 ? prior.by_rotation : prior.by_translation);
+        row[i] +=
+            i < mode_count ? prior.by_mode : (i < mode_count + 3 ? prior.by_rotation : prior.by_translation);
     }
     std::array<double, ShapeInformation::kSize> scratch{};
     factor.by_mode = prior.by_mode;
-    factor.modes_done = keep || upper_factor(factor.upper.data(), 0, mode_count, size, ShapeFactor::kStride,
-                                             scratch.data());
-    return factor.modes_done && upper_factor(factor.upper.data(), mode_count, size, size,
-                                             ShapeFactor::kStride, scratch.data());
+    factor.modes_done =
+        keep || upper_factor(factor.upper.data(), 0, mode_count, size, ShapeFactor::kStride, scratch.data());
+    return factor.modes_done &&
+           upper_factor(factor.upper.data(), mode_count, size, size, ShapeFactor::kStride, scratch.data());
 }
 
 double solve_shape(const ShapeFactor& factor, std::size_t mode_count, double* x) {

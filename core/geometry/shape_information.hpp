@@ -18,10 +18,10 @@ struct ShapeInformation {
     static constexpr std::size_t kStride = row_stride(kSize);
 
     bool built = false;
-    std::uint16_t changes = 0;  // markers changed since it was built
-    Mat3 rotation = Mat3::Identity();  // headset_from_face that turned the informations
-    std::array<Mat3, kMaxMarkers> informations{};   // in the matrix, headset frame; zero: not in it
-    std::array<Vec3, kMaxMarkers> positions_mm{};   // where the markers were put, face frame
+    std::uint16_t changes = 0;                     // markers changed since it was built
+    Mat3 rotation = Mat3::Identity();              // headset_from_face that turned the informations
+    std::array<Mat3, kMaxMarkers> informations{};  // in the matrix, headset frame; zero: not in it
+    std::array<Vec3, kMaxMarkers> positions_mm{};  // where the markers were put, face frame
     // Rows of the upper triangle; what lies left of the diagonal is not used.
     std::array<float, kSize * kStride> matrix{};
     std::array<float, 3 * kStride> weighted{};  // scratch: W J of one marker
@@ -45,7 +45,7 @@ bool follow_markers(const ShapeModel& model, const Mat3& rotation, std::span<con
 struct ShapeFactor {
     static constexpr std::size_t kStride = row_stride(ShapeInformation::kSize + kLaneFloats);
     bool modes_done = false;
-    double by_mode = 0.0;  // information of the modes' prior in it
+    double by_mode = 0.0;                                           // information of the modes' prior in it
     std::array<double, ShapeInformation::kSize * kStride> upper{};  // L^T of L L^T, row-major
 };
 

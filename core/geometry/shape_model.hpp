@@ -25,7 +25,7 @@ struct ShapeModel {
     std::array<Vec3, kMaxMarkers> mean_mm{};
     std::array<Vec3, kMaxMarkers * kMaxModes> modes{};
     // The modes again, rounded, for the kernels of the fit: coordinate 3 k + axis of mode j, zeros elsewhere.
-    std::array<float, kMaxRows * kMaxModes> rows{};           // [3 k + axis][j]
+    std::array<float, kMaxRows * kMaxModes> rows{};          // [3 k + axis][j]
     std::array<float, kMaxModes * kColumnStride> columns{};  // [j][3 k + axis]
 
     [[nodiscard]] Vec3 face_position(std::size_t marker, std::span<const double> coefficients) const;

@@ -24,6 +24,9 @@ struct StabiliserConfig {
     double step_rotation_sigma_rad = 0.0005;
     double step_translation_sigma_mm = 0.05;
     double jolt_sigmas = 2.5;
+    // A marker farther than this from the fitted face counts less, by the fourth power of its distance: what
+    // stands off by millimetres was named or measured wrongly.
+    double outlier_mm = 2.0;
     int first_steps = 10;  // of the fit, at most: from a cold start
     int steps = 6;         // ... from the previous frame
 };
@@ -38,6 +41,8 @@ struct StabiliserWorkspace {
     ShapeFitWorkspace fit;
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> informations{};
+    std::array<double, kMaxMarkers> trust{};  // share of its information that a marker keeps
+    std::array<double, kMaxMarkers> distance_mm{};
 };
 
 struct StabiliserReport {
@@ -45,9 +50,12 @@ struct StabiliserReport {
     bool ok = false;    // false: too little was seen; the previous pose is used
     double slip_rotation_rad = 0.0;
     double slip_translation_mm = 0.0;
+    std::uint16_t doubted = 0;  // markers that count less than half: off the face by more than outlier_mm
 };
 
 void reset_stabiliser(StabiliserState& state);
+
+// A marker that stands off the face is handed on with the information that it kept here.
 
 void stabilise(const ShapeModel& model, const StabiliserConfig& config, const NamedMarkers& named,
                StabiliserState& state, StabiliserWorkspace& workspace, StabiliserOutput& output,

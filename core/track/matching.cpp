@@ -113,11 +113,13 @@ void fill_buckets(std::size_t count, ViewPlane& plane) {
         ++plane.bucket_start[plane.bucket[j] + 1U];
     }
     for (std::size_t b = 0; b < ViewPlane::kBuckets; ++b) {
-        plane.bucket_start[b + 1] = static_cast<std::uint16_t>(plane.bucket_start[b + 1] + plane.bucket_start[b]);
+        plane.bucket_start[b + 1] =
+            static_cast<std::uint16_t>(plane.bucket_start[b + 1] + plane.bucket_start[b]);
     }
     std::array<std::uint16_t, ViewPlane::kBuckets> next{};
     std::copy_n(plane.bucket_start.begin(), ViewPlane::kBuckets, next.begin());
-    for (std::size_t j = 0; j < count; ++j) plane.order[next[plane.bucket[j]]++] = static_cast<std::uint16_t>(j);
+    for (std::size_t j = 0; j < count; ++j)
+        plane.order[next[plane.bucket[j]]++] = static_cast<std::uint16_t>(j);
 }
 
 void lay_out(std::span<const Sighting> seen, ViewPlane& plane) {
@@ -205,13 +207,15 @@ void find_groups(std::size_t markers, std::size_t sightings, MatchingWorkspace& 
 }
 
 // Rows, columns and costs of the group that `leader` leads.
-AssignmentProblem problem_of(std::size_t leader, std::size_t markers, double alone_cost, MatchingWorkspace& w) {
+AssignmentProblem problem_of(std::size_t leader, std::size_t markers, double alone_cost,
+                             MatchingWorkspace& w) {
     AssignmentProblem problem;
     problem.alone_cost = alone_cost;
     for (std::size_t k = leader; k < markers; ++k) {
         if (w.group[k] != leader) continue;
         w.rows[problem.row_count++] = static_cast<std::uint16_t>(k);
-        for (std::size_t i = w.pair_start[k]; i < w.pair_start[k + 1]; ++i) w.column_of[w.pair_sighting[i]] = -1;
+        for (std::size_t i = w.pair_start[k]; i < w.pair_start[k + 1]; ++i)
+            w.column_of[w.pair_sighting[i]] = -1;
     }
     for (std::size_t r = 0; r < problem.row_count; ++r) {
         for (std::size_t i = w.pair_start[w.rows[r]]; i < w.pair_start[w.rows[r] + 1U]; ++i) {
@@ -264,7 +268,8 @@ void match_views(std::span<const Vec3> predicted_mm, const SightingSet& sighting
         find_groups(predicted_mm.size(), seen.size(), workspace);
         for (std::size_t k = 0; k < predicted_mm.size(); ++k) matches[view][k] = -1;
         for (std::size_t k = 0; k < predicted_mm.size(); ++k) {
-            if (workspace.group[k] == k) assign_group(k, predicted_mm.size(), gate_mm, workspace, matches[view]);
+            if (workspace.group[k] == k)
+                assign_group(k, predicted_mm.size(), gate_mm, workspace, matches[view]);
         }
     }
 }

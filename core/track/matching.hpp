@@ -40,7 +40,8 @@ struct MatchingWorkspace {
     std::array<std::uint16_t, kMaxMarkers + 1> pair_start{};
     std::array<std::uint16_t, kMaxMarkers * kMaxSightings> pair_sighting{};
     std::array<double, kMaxMarkers * kMaxSightings> pair_cost{};
-    // Markers that compete for sightings, directly or through others, form a group, named by its first marker.
+    // Markers that compete for sightings, directly or through others, form a group, named by its first
+    // marker.
     std::array<std::uint16_t, kMaxMarkers> group{};
     std::array<std::int16_t, kMaxSightings> first_marker{};  // that is near a sighting, -1 none
     std::array<std::uint16_t, kMaxMarkers> rows{};           // of one group
@@ -52,7 +53,8 @@ struct MatchingWorkspace {
 };
 
 // Optimal assignment per view, cost = squared distance of the prediction from the ray or point, nothing
-// beyond the gate. Groups of markers without a common sighting are assigned apart: the same optimum. predicted_mm [marker_count], headset frame.
+// beyond the gate. Groups of markers without a common sighting are assigned apart: the same optimum.
+// predicted_mm [marker_count], headset frame.
 void match_views(std::span<const Vec3> predicted_mm, const SightingSet& sightings, double gate_mm,
                  MatchingWorkspace& workspace, Matches& matches);
 

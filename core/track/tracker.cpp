@@ -244,8 +244,8 @@ void check_names(const ShapeModel& model, const TrackerConfig& config, std::span
     fit_face(model, wide, state, named, w);
     bool contradicted = false;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
-        contradicted = contradicted || (named.markers[k].seen &&
-                                        residual_of(w, state, named, k) > config.outlier_mm);
+        contradicted =
+            contradicted || (named.markers[k].seen && residual_of(w, state, named, k) > config.outlier_mm);
     }
     if (contradicted) {
         predict_face(model, state, w);

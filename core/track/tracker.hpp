@@ -34,7 +34,7 @@ struct TrackerConfig {
 struct TrackerState {
     bool tracking = false;
     std::uint16_t poor_frames = 0;
-    ShapeFit fit;                                 // of the last frame
+    ShapeFit fit;  // of the last frame
     ShapeFitMemory memory;
     std::array<Vec3, kMaxMarkers> position_mm{};  // last known, headset frame
     std::array<Vec3, kMaxMarkers> velocity_mm{};  // per frame

@@ -38,9 +38,11 @@ std::vector<Tick> make_ticks(const SyntheticFace& face) {
     std::vector<Tick> ticks(kWarmFrames + kCountedFrames);
     for (std::size_t f = 0; f < ticks.size(); ++f) {
         const double time_s = static_cast<double>(f) / 60.0;
-        const std::vector<Vec3> points = moved(creeping_slip(time_s), face.positions(face.weights_at(time_s)));
+        const std::vector<Vec3> points =
+            moved(creeping_slip(time_s), face.positions(face.weights_at(time_s)));
         Tick& tick = ticks[f];
-        for (std::size_t c = 0; c < 2; ++c) tick.views.push_back(face.observe(c, points, 0.1, 0.02, 2, random));
+        for (std::size_t c = 0; c < 2; ++c)
+            tick.views.push_back(face.observe(c, points, 0.1, 0.02, 2, random));
         tick.frame.capture_us = static_cast<std::int64_t>(time_s * 1e6);
         tick.frame.camera_count = 2;
         for (std::size_t c = 0; c < 2; ++c) {
