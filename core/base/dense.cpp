@@ -155,17 +155,13 @@ void symmetric_inverse(const double* l, std::size_t n, std::size_t stride, doubl
     }
 }
 
-bool inverse_of_factor(double* a, std::size_t n, std::size_t stride, double* inverse, double* scratch,
-                       double floor) {
-    RIG_CHECK(stride >= n + kLaneFloats && a != inverse);
+bool upper_factor(double* a, std::size_t first, std::size_t last, std::size_t n, std::size_t stride,
+                  double* scratch, double floor) {
     double largest = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t i = first; i < last; ++i) {
         if (a[i * stride + i] > largest) largest = a[i * stride + i];
-        for (std::size_t j = n; j < n + kLaneFloats; ++j) a[i * stride + j] = 0.0;
-        for (std::size_t j = 0; j < padded(n); ++j) inverse[i * stride + j] = 0.0;
     }
-    // Row i of L^T from the rows above it.
-    for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t i = first; i < last; ++i) {
         double* row = a + i * stride + i;
         for (std::size_t j = 0; j < i; ++j) scratch[j] = -a[j * stride + i];
         combine_rows(a + i, stride, scratch, i, n - i, row, row);
@@ -173,6 +169,17 @@ bool inverse_of_factor(double* a, std::size_t n, std::size_t stride, double* inv
         const double scale = 1.0 / std::sqrt(row[0]);
         for (std::size_t j = 0; j < n - i; ++j) row[j] *= scale;
     }
+    return true;
+}
+
+bool inverse_of_factor(double* a, std::size_t n, std::size_t stride, double* inverse, double* scratch,
+                       double floor) {
+    RIG_CHECK(stride >= n + kLaneFloats && a != inverse);
+    for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t j = n; j < n + kLaneFloats; ++j) a[i * stride + j] = 0.0;
+        for (std::size_t j = 0; j < padded(n); ++j) inverse[i * stride + j] = 0.0;
+    }
+    if (!upper_factor(a, 0, n, n, stride, scratch, floor)) return false;
     for (std::size_t i = 0; i < n; ++i) {
         double* row = inverse + i * stride;
         const double scale = 1.0 / a[i * stride + i];

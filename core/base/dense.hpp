@@ -28,6 +28,13 @@ void solve_lower_transposed(const double* l, std::size_t n, std::size_t stride, 
 // `inverse`; stride is at least padded(n) (float_kernels.hpp); scratch holds n doubles. n^3 / 2 operations.
 void symmetric_inverse(const double* l, std::size_t n, std::size_t stride, double* inverse, double* scratch);
 
+// Rows [first, last) of L^T, a = L L^T symmetric and positive definite, n x n (its upper triangle is read),
+// in the place of a's; the rows above `first` hold L^T already. Rows are `stride` apart, stride at least n +
+// kLaneFloats, zeros in [n, n + kLaneFloats); scratch holds n doubles. False as cholesky(), by the largest
+// diagonal entry of the rows at hand.
+[[nodiscard]] bool upper_factor(double* a, std::size_t first, std::size_t last, std::size_t n,
+                                std::size_t stride, double* scratch, double floor = 1e-14);
+
 // L^-1 of a = L L^T, symmetric and positive definite: `a` (its upper triangle is read) becomes L^T, and
 // `inverse` the lower triangle of L^-1 with zeros to its right, up to padded(n). Rows of both are `stride`
 // apart, stride at least n + kLaneFloats; scratch holds n doubles. n^3 / 3 operations, all in wide rows.

@@ -337,6 +337,22 @@ void add_squares(double* m, std::size_t stride, std::size_t k, const double* vec
     squares<double>(m, k, {vectors, stride, sign, count});
 }
 
+void add_triple(float* m, std::size_t stride, const Triples& triples, std::size_t begin, std::size_t end,
+                std::size_t size, const float* vectors) {
+    using W = Wide<float>;
+    for (std::size_t i = begin; i < end; ++i) {
+        const float* t = triples.first + (i - begin) * triples.stride;
+        const float t0 = t[0];
+        const float t1 = t[1];
+        const float t2 = t[2];
+        float* row = m + i * stride;
+        for (std::size_t c = i / W::kLanes * W::kLanes; c < size; c += W::kLanes) {
+            W::at(row + c) = ((W::at(row + c) + t0 * W::at(vectors + c)) + t1 * W::at(vectors + stride + c)) +
+                             t2 * W::at(vectors + 2 * stride + c);
+        }
+    }
+}
+
 float room_ahead(const BoxedStep<float>& step, std::size_t n, float* out) {
     return room(step, n, out);
 }

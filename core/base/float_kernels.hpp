@@ -54,6 +54,18 @@ void add_squares(float* m, std::size_t stride, std::size_t k, const float* vecto
 void add_squares(double* m, std::size_t stride, std::size_t k, const double* vectors, const double* sign,
                  std::size_t count);
 
+// Triples of floats, number i at first + i stride.
+struct Triples {
+    const float* first;
+    std::size_t stride;
+};
+
+// Rows [begin, end) of the upper triangle of m: row_i += t0 v_0 + t1 v_1 + t2 v_2 in this order, t the triple
+// i - begin, v_0 .. v_2 the rows of `vectors`; m and vectors have rows `stride` apart, zeros from `size` on.
+// What lies left of the diagonal is spoilt.
+void add_triple(float* m, std::size_t stride, const Triples& triples, std::size_t begin, std::size_t end,
+                std::size_t size, const float* vectors);
+
 // The arrays of the following have room for padded(n), zeros behind n.
 
 template <typename Real>

@@ -24,7 +24,7 @@ namespace rig {
 // kFilter: a window, a kind of filter or the delay is outside its range.
 enum class PipelineError : std::uint8_t { kPackLimits, kRate, kFilter };
 
-// About 19 MB, all of it inside the object: a program places it before seal(), never on a stack. step() and
+// About 20 MB, all of it inside the object: a program places it before seal(), never on a stack. step() and
 // idle() never allocate. The pack's bytes outlive it. One thread uses a pipeline.
 class Pipeline {
   public:

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/base/linalg.hpp"
-#include "core/geometry/shape_model.hpp"
+#include "core/geometry/shape_fit.hpp"
 #include "core/limits.hpp"
 
 namespace rig {

@@ -8,7 +8,7 @@
 #include <array>
 #include <cstdint>
 
-#include "core/geometry/shape_model.hpp"
+#include "core/geometry/shape_fit.hpp"
 #include "core/stabilise/stabilised_markers.hpp"
 #include "core/track/named_markers.hpp"
 
@@ -24,19 +24,25 @@ struct StabiliserConfig {
     double step_rotation_sigma_rad = 0.0005;
     double step_translation_sigma_mm = 0.05;
     double jolt_sigmas = 2.5;
-    int first_iterations = 6;  // Gauss-Newton steps from a cold start
-    int iterations = 3;        // ... from the previous frame
+    // A marker farther than this from the fitted face counts less, by the fourth power of its distance: what
+    // stands off by millimetres was named or measured wrongly.
+    double outlier_mm = 2.0;
+    int first_steps = 10;  // of the fit, at most: from a cold start
+    int steps = 6;         // ... from the previous frame
 };
 
 struct StabiliserState {
     bool warm = false;
     ShapeFit fit;  // of the previous frame
+    ShapeFitMemory memory;
 };
 
 struct StabiliserWorkspace {
     ShapeFitWorkspace fit;
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> informations{};
+    std::array<double, kMaxMarkers> trust{};  // share of its information that a marker keeps
+    std::array<double, kMaxMarkers> distance_mm{};
 };
 
 struct StabiliserReport {
@@ -44,9 +50,12 @@ struct StabiliserReport {
     bool ok = false;    // false: too little was seen; the previous pose is used
     double slip_rotation_rad = 0.0;
     double slip_translation_mm = 0.0;
+    std::uint16_t doubted = 0;  // markers that count less than half: off the face by more than outlier_mm
 };
 
 void reset_stabiliser(StabiliserState& state);
+
+// A marker that stands off the face is handed on with the information that it kept here.
 
 void stabilise(const ShapeModel& model, const StabiliserConfig& config, const NamedMarkers& named,
                StabiliserState& state, StabiliserWorkspace& workspace, StabiliserOutput& output,

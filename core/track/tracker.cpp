@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kBiasLearning =
     0.02;  // per frame: follows a head the model does not quite fit within a second
+// Names need the face to a tenth of a millimetre; its fitted markers' own deviation is half of that.
+constexpr ShapeFitLimits kFitLimits{6, 0.3};
 
 std::span<const Vec3> predicted(const ShapeModel& model, const TrackerWorkspace& w) {
     return {w.predicted_mm.data(), model.marker_count};
@@ -38,10 +40,10 @@ void predict_motion(const ShapeModel& model, const TrackerConfig& config, const 
     }
 }
 
-void predict_face(const ShapeModel& model, const ShapeFit& fit, const TrackerState& state,
-                  TrackerWorkspace& w) {
+// From the face that was fitted last.
+void predict_face(const ShapeModel& model, const TrackerState& state, TrackerWorkspace& w) {
     for (std::size_t k = 0; k < model.marker_count; ++k) {
-        w.predicted_mm[k] = fit.headset_position(model, k) + state.bias_mm[k];
+        w.predicted_mm[k] = w.fit.headset_mm[k] + state.bias_mm[k];
     }
 }
 
@@ -65,9 +67,9 @@ std::span<const Vec3> row_velocity(const ShapeModel& model, const TrackerConfig&
     return {w.velocity_mm_per_us.data(), model.marker_count};
 }
 
-double residual_of(const ShapeModel& model, const ShapeFit& fit, const TrackerState& state,
-                   const NamedMarkers& named, std::size_t k) {
-    const Vec3 e = named.markers[k].position_mm - fit.headset_position(model, k) - state.bias_mm[k];
+double residual_of(const TrackerWorkspace& w, const TrackerState& state, const NamedMarkers& named,
+                   std::size_t k) {
+    const Vec3 e = named.markers[k].position_mm - w.fit.headset_mm[k] - state.bias_mm[k];
     // Only what was measured counts: the depth along a single ray was predicted.
     const double trust = named.markers[k].information.trace();
     const Vec3 measured = named.markers[k].information * e;
@@ -75,7 +77,7 @@ double residual_of(const ShapeModel& model, const ShapeFit& fit, const TrackerSt
 }
 
 // Fit, then again without the names that the first fit contradicts.
-void fit_face(const ShapeModel& model, const TrackerConfig& config, const TrackerState& state,
+void fit_face(const ShapeModel& model, const TrackerConfig& config, TrackerState& state,
               const NamedMarkers& named, TrackerWorkspace& w) {
     const ShapePrior prior = prior_from(config, state);
     for (std::size_t k = 0; k < model.marker_count; ++k) {
@@ -85,11 +87,12 @@ void fit_face(const ShapeModel& model, const TrackerConfig& config, const Tracke
     }
     const std::span<const Vec3> positions(w.positions_mm.data(), model.marker_count);
     const std::span<const Mat3> informations(w.informations.data(), model.marker_count);
-    fit_shape(model, positions, informations, prior, 2, state.fit, w.fit, w.next);
+    w.fitted_matches = w.matches;
+    fit_shape(model, positions, informations, prior, kFitLimits, state.fit, state.memory, w.fit, w.next);
     bool doubted = false;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         if (!named.markers[k].seen) continue;
-        const double residual = residual_of(model, w.next, state, named, k);
+        const double residual = residual_of(w, state, named, k);
         if (residual <= config.outlier_mm) continue;
         // A doubted name keeps a little weight: the wrong fit may be what contradicts a right name.
         const double ratio = config.outlier_mm / residual;
@@ -98,22 +101,22 @@ void fit_face(const ShapeModel& model, const TrackerConfig& config, const Tracke
     }
     if (!doubted) return;
     const ShapeFit before = w.next;
-    fit_shape(model, positions, informations, prior, 2, before, w.fit, w.next);
+    fit_shape(model, positions, informations, prior, kFitLimits, before, state.memory, w.fit, w.next);
 }
 
 // Names that do not lie on the fitted face are taken back.
 void reject_outliers(const ShapeModel& model, const TrackerConfig& config, const TrackerState& state,
-                     const ShapeFit& fit, NamedMarkers& named, Matches& matches, TrackerReport& report) {
+                     NamedMarkers& named, TrackerWorkspace& w, TrackerReport& report) {
     for (std::size_t k = 0; k < model.marker_count; ++k) {
-        if (!named.markers[k].seen || residual_of(model, fit, state, named, k) <= config.outlier_mm) continue;
+        if (!named.markers[k].seen || residual_of(w, state, named, k) <= config.outlier_mm) continue;
         named.markers[k] = NamedMarker{};
-        for (auto& view : matches) view[k] = -1;
+        for (auto& view : w.matches) view[k] = -1;
         ++report.rejected;
     }
 }
 
-void remember(const ShapeModel& model, const NamedMarkers& named, const ShapeFit& fit, TrackerState& state,
-              TrackerReport& report) {
+void remember(const ShapeModel& model, const NamedMarkers& named, const TrackerWorkspace& w,
+              TrackerState& state, TrackerReport& report) {
     double sum = 0.0;
     report.seen = 0;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
@@ -127,12 +130,12 @@ void remember(const ShapeModel& model, const NamedMarkers& named, const ShapeFit
         state.velocity_mm[k] = state.missed[k] == 0 ? step : Vec3{Vec3::Zero()};
         state.position_mm[k] = marker.position_mm;
         state.missed[k] = 0;
-        const Vec3 off = marker.position_mm - fit.headset_position(model, k);
+        const Vec3 off = marker.position_mm - w.fit.headset_mm[k];
         sum += (off - state.bias_mm[k]).squaredNorm();
         state.bias_mm[k] += kBiasLearning * (off - state.bias_mm[k]);
         ++report.seen;
     }
-    state.fit = fit;
+    state.fit = w.next;
     report.residual_mm = report.seen == 0 ? 0.0 : std::sqrt(sum / report.seen);
 }
 
@@ -146,6 +149,16 @@ void count_changes(const ShapeModel& model, const SightingSet& sightings, const 
         }
         report.swaps_repaired = static_cast<std::uint16_t>(report.swaps_repaired + (changed ? 1 : 0));
     }
+}
+
+// Then the fit stands: what the views say across their rays does not depend on what was predicted.
+bool same_names(const ShapeModel& model, const SightingSet& sightings, const Matches& a, const Matches& b) {
+    for (std::size_t view = 0; view < sightings.view_count; ++view) {
+        for (std::size_t k = 0; k < model.marker_count; ++k) {
+            if (a[view][k] != b[view][k]) return false;
+        }
+    }
+    return true;
 }
 
 void clear_matches(Matches& matches) {
@@ -215,14 +228,17 @@ void track(const ShapeModel& model, const TrackerConfig& config, const SightingS
     combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
     fit_face(model, config, state, named, w);
 
-    predict_face(model, w.next, state, w);
+    predict_face(model, state, w);
     velocity = row_velocity(model, config, sightings, state, &w.next, w);
     match_views(predicted(model, w), sightings, config.final_gate_mm, w.matching, w.matches, velocity);
     combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
-    fit_face(model, config, state, named, w);
-    reject_outliers(model, config, state, w.next, named, w.matches, report);
+    // With a rolling shutter the positions have moved with the new velocities, whatever the names.
+    if (!velocity.empty() || !same_names(model, sightings, w.matches, w.fitted_matches)) {
+        fit_face(model, config, state, named, w);
+    }
+    reject_outliers(model, config, state, named, w, report);
     count_changes(model, sightings, w.first_matches, w.matches, report);
-    remember(model, named, w.next, state, report);
+    remember(model, named, w, state, report);
     state.capture_us = sightings.capture_us;
     report.matches = w.matches;
     notice_loss(model, config, state, report);
@@ -255,23 +271,25 @@ void check_names(const ShapeModel& model, const TrackerConfig& config, std::span
         wide.pose_sigma_mm = config.bootstrap.translation_sigma_mm;
         wide.expression_sigma = 1.5;
     }
-    predict_face(model, state.fit, state, w);
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        w.predicted_mm[k] = state.fit.headset_position(model, k) + state.bias_mm[k];
+    }
     combine_views(predicted(model, w), scratch, config.gap_limit_mm, w.matches, named);
     fit_face(model, wide, state, named, w);
     bool contradicted = false;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
-        contradicted = contradicted || (named.markers[k].seen &&
-                                        residual_of(model, w.next, state, named, k) > config.outlier_mm);
+        contradicted =
+            contradicted || (named.markers[k].seen && residual_of(w, state, named, k) > config.outlier_mm);
     }
     if (contradicted) {
-        predict_face(model, w.next, state, w);
+        predict_face(model, state, w);
         match_views(predicted(model, w), scratch, config.final_gate_mm, w.matching, w.matches);
         combine_views(predicted(model, w), scratch, config.gap_limit_mm, w.matches, named);
         fit_face(model, wide, state, named, w);
-        reject_outliers(model, config, state, w.next, named, w.matches, report);
+        reject_outliers(model, config, state, named, w, report);
         count_changes(model, scratch, w.first_matches, w.matches, report);
     }
-    remember(model, named, w.next, state, report);
+    remember(model, named, w, state, report);
     report.matches = w.matches;
     notice_loss(model, config, state, report);
 }

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-#include "core/geometry/shape_model.hpp"
+#include "core/geometry/shape_fit.hpp"
 #include "core/track/bootstrap.hpp"
 #include "core/track/matching.hpp"
 #include "core/track/named_markers.hpp"
@@ -35,8 +35,9 @@ struct TrackerConfig {
 struct TrackerState {
     bool tracking = false;
     std::uint16_t poor_frames = 0;
-    std::int64_t capture_us = 0;                  // of the last frame
-    ShapeFit fit;                                 // of the last frame
+    std::int64_t capture_us = 0;  // of the last frame
+    ShapeFit fit;                 // of the last frame
+    ShapeFitMemory memory;
     std::array<Vec3, kMaxMarkers> position_mm{};  // last known, headset frame
     std::array<Vec3, kMaxMarkers> velocity_mm{};  // per frame
     std::array<Vec3, kMaxMarkers> bias_mm{};      // how a marker differs from the fitted face, slowly learnt
@@ -50,6 +51,7 @@ struct TrackerWorkspace {
     ShapeFitWorkspace fit;
     Matches matches{};
     Matches first_matches{};
+    Matches fitted_matches{};  // the names behind `next`
     ShapeFit next;
     std::array<Vec3, kMaxMarkers> predicted_mm{};
     std::array<Vec3, kMaxMarkers> velocity_mm_per_us{};  // during this frame; used with a rolling shutter

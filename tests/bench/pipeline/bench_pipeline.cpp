@@ -1,6 +1,7 @@
 // Latency and memory of the solver side of the pipeline, observations in hand to FaceState, in one table:
-// marker streams and helmets of one to four cameras, small to largest rigs. Thread CPU time, so that a busy
-// machine disturbs it less. Detection is measured by bench_vision. Not a test: nothing here fails because a
+// marker streams and helmets of one to four cameras, small to largest rigs; and where a frame's time goes,
+// pictures included. Thread CPU time, so that a busy machine disturbs it less. Detection against others is
+// measured by bench_vision. Not a test: nothing here fails because a
 // machine is slow.
 #include <fmt/format.h>
 
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "core/pipeline/pipeline.hpp"
+#include "tests/bench/pipeline/stage_times.hpp"
 #include "tests/bench/thread_clock.hpp"
 #include "tests/support/synthetic_face.hpp"
 
@@ -147,6 +149,7 @@ int main(int argc, char** argv) {
         fmt::print("| {} | {} | {} | {:.0f} | {:.0f} | {:.0f} | {:.1f} | {:.1f} |\n", c.name, c.markers,
                    c.shapes, s.p50_us, s.p99_us, s.max_us, s.seen, s.iterations);
     }
+    rig::test::print_stage_times(std::clamp<std::size_t>(frames / 4, 10, 150));  // drawing takes its time
     rig::test::print_memory();
     return 0;
 }

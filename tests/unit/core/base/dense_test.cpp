@@ -179,6 +179,32 @@ TEST(Dense, InverseOfFactorRefusesWhatIsNotPositiveDefinite) {
     }
 }
 
+// The last rows may be done again, with another diagonal, on those above them.
+TEST(Dense, UpperFactorGoesOnWhereItStopped) {
+    test::SeededRandom random(63);
+    for (const std::size_t n : {7U, 17U, 54U}) {
+        const std::size_t stride = n + kLaneFloats;
+        const Matrix gram = positive_definite(n, stride, 0.5, random);
+        Matrix whole(n * stride, 0.0);
+        for (std::size_t i = 0; i < n; ++i) {
+            for (std::size_t j = 0; j <= i; ++j) whole[j * stride + i] = gram[i * stride + j];
+        }
+        Matrix parts = whole;
+        const std::size_t from = n - 6;
+        for (std::size_t i = from; i < n; ++i) whole[i * stride + i] += 3.0;
+        std::vector<double> scratch(n);
+        const Matrix rest(parts.begin() + static_cast<std::ptrdiff_t>(from * stride), parts.end());
+        ASSERT_TRUE(upper_factor(parts.data(), 0, n, n, stride, scratch.data()));
+        std::copy(rest.begin(), rest.end(), parts.begin() + static_cast<std::ptrdiff_t>(from * stride));
+        for (std::size_t i = from; i < n; ++i) parts[i * stride + i] += 3.0;
+        ASSERT_TRUE(upper_factor(parts.data(), from, n, n, stride, scratch.data()));
+        ASSERT_TRUE(upper_factor(whole.data(), 0, n, n, stride, scratch.data()));
+        for (std::size_t i = 0; i < n; ++i) {
+            for (std::size_t j = i; j < n; ++j) EXPECT_EQ(parts[i * stride + j], whole[i * stride + j]);
+        }
+    }
+}
+
 TEST(Dense, CholeskyRefusesWhatIsNotPositiveDefinite) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const double infinity = std::numeric_limits<double>::infinity();

@@ -148,6 +148,37 @@ TYPED_TEST(FloatKernels, SquaresTogetherEqualSquaresInTurn) {
     }
 }
 
+// The upper triangle, term by term in order; the columns beyond it stay what they were.
+TEST(TripleRows, AddInOrder) {
+    test::SeededRandom random(17);
+    for (std::size_t size = 1; size < 60; size += 7) {
+        const std::size_t stride = row_stride(size);
+        std::vector<float> m(size * stride, 0.0F), vectors(3 * stride, 0.0F), triples(5 * size);
+        for (std::size_t r = 0; r < 3; ++r) {
+            for (std::size_t c = 0; c < size; ++c)
+                vectors[r * stride + c] = static_cast<float>(random.normal(0.0, 1.0));
+        }
+        for (std::size_t r = 0; r < size; ++r) {
+            for (std::size_t c = 0; c < size; ++c)
+                m[r * stride + c] = static_cast<float>(random.normal(0.0, 1.0));
+        }
+        for (float& t : triples) t = static_cast<float>(random.normal(0.0, 1.0));
+        std::vector<float> expected = m;
+        const std::size_t begin = size / 3;
+        for (std::size_t i = begin; i < size; ++i) {
+            const float* t = triples.data() + 5 * (i - begin);
+            for (std::size_t c = i; c < size; ++c) {
+                float& sum = expected[i * stride + c];
+                for (std::size_t r = 0; r < 3; ++r) sum += t[r] * vectors[r * stride + c];
+            }
+        }
+        add_triple(m.data(), stride, {triples.data(), 5}, begin, size, size, vectors.data());
+        for (std::size_t i = 0; i < size; ++i) {
+            for (std::size_t c = i; c < stride; ++c) ASSERT_EQ(m[i * stride + c], expected[i * stride + c]);
+        }
+    }
+}
+
 // What lies behind n is skipped as far as the vectors allow, and nothing before it changes.
 TYPED_TEST(FloatKernels, NarrowRowsGiveTheSameNumbers) {
     using Real = TypeParam;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -126,6 +127,78 @@ TEST(Matching, PredictionDoesNotPullAMeasuredPoint) {
             EXPECT_LT((named->markers[k].information * sigma_mm * sigma_mm - Mat3::Identity()).norm(), 1e-12);
         }
     }
+}
+
+// What the matches of a view cost, markers that stay alone included; checks that they are allowed.
+double cost_of(std::span<const std::int16_t> match, std::span<const Vec3> predicted,
+               std::span<const Sighting> seen, double gate_mm) {
+    double sum = 0.0;
+    std::vector<bool> used(seen.size(), false);
+    for (std::size_t k = 0; k < predicted.size(); ++k) {
+        if (match[k] < 0) {
+            sum += gate_mm * gate_mm;
+            continue;
+        }
+        const auto at = static_cast<std::size_t>(match[k]);
+        EXPECT_FALSE(used[at]) << "a sighting is used once";
+        used[at] = true;
+        const double cost = seen[at].squared_distance_mm2(predicted[k]);
+        EXPECT_LT(cost, gate_mm * gate_mm);
+        sum += cost;
+    }
+    return sum;
+}
+
+// Buckets and groups find the optimum of the assignment over all pairs: tight and wide gates, rays of one
+// camera, rays that meet nowhere, rays beside and behind the marker, clouds, far predictions.
+TEST(Matching, GroupsFindTheOptimumOfAllPairs) {
+    Scene s(2);
+    auto whole = std::make_unique<AssignmentWorkspace>();
+    for (int round = 0; round < 120; ++round) {
+        s.look(0.5, 0.1, round % 20);
+        add_point_view(s.truth, 0.1, *s.sightings);
+        std::vector<Vec3> cloud = s.truth;
+        test::add_noise(cloud, 2.0, s.random);
+        add_point_view(cloud, 0.1, *s.sightings);
+        if (round % 4 == 1) {
+            for (Sighting& sighting : s.sightings->views[0]) sighting.point_mm += 20.0 * sighting.direction;
+        } else if (round % 4 == 2) {
+            for (Sighting& sighting : s.sightings->views[0]) {
+                if (s.random.chance(0.3)) sighting.direction = -sighting.direction;
+            }
+        }
+        std::vector<Vec3> predicted = s.truth;
+        test::add_noise(predicted, 0.3 * (round % 12), s.random);
+        if (round % 5 == 0) predicted[7] = Vec3{1e9, -1e9, 1e9};
+        if (round % 5 == 1) predicted[8] = s.face->pack().cameras[0].centre_mm;
+        const double gate_mm = 1.0 + 1.5 * (round % 11);
+        match_views(predicted, *s.sightings, gate_mm, *s.workspace, *s.matches);
+        for (std::size_t view = 0; view < 4; ++view) {
+            const auto& seen = s.sightings->views[view];
+            std::vector<double> cost;
+            for (const Vec3& x : predicted) {
+                for (const Sighting& sighting : seen)
+                    cost.push_back(std::max(0.0, sighting.squared_distance_mm2(x)));
+            }
+            AssignmentProblem problem{predicted.size(), seen.size(), cost, gate_mm * gate_mm};
+            std::vector<std::int16_t> best(predicted.size());
+            solve_assignment(problem, *whole, best);
+            const double least = cost_of(best, predicted, seen.span(), gate_mm);
+            const double got = cost_of((*s.matches)[view], predicted, seen.span(), gate_mm);
+            ASSERT_NEAR(got, least, 1e-9 * least) << "round " << round << " view " << view;
+        }
+    }
+}
+
+TEST(Matching, PredictionsThatAreNoNumbersStayAlone) {
+    Scene s(1);
+    s.look(0.1, 0.0, 0);
+    std::vector<Vec3> predicted = s.truth;
+    predicted[0] = Vec3::Constant(std::nan(""));
+    predicted[1] = Vec3::Constant(HUGE_VAL);
+    match_views(predicted, *s.sightings, 4.0, *s.workspace, *s.matches);
+    EXPECT_EQ((*s.matches)[0][0], -1);
+    EXPECT_EQ((*s.matches)[0][1], -1);
 }
 
 }  // namespace

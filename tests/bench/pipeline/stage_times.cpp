@@ -1,0 +1,204 @@
+#include "tests/bench/pipeline/stage_times.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "core/pipeline/pipeline.hpp"
+#include "tests/bench/thread_clock.hpp"
+#include "tests/support/dot_scene/dot_scene.hpp"
+#include "tests/support/synthetic_face.hpp"
+
+namespace rig::test {
+namespace {
+
+constexpr std::size_t kCameras = 2;
+constexpr std::size_t kMarkers = 60;
+constexpr double kDotMm = 4.0;           // painted
+constexpr double kCentreSigmaPx = 0.15;  // as the pipeline takes it
+constexpr double kRateHz = 60.0;
+
+enum Stage : std::size_t { kDetect, kTrack, kStabilise, kInfer, kSolve, kRest, kAll, kStages };
+constexpr std::array<const char*, kStages> kNames{"detect, two pictures",
+                                                  "track, rays included",
+                                                  "stabilise",
+                                                  "infer",
+                                                  "solve",
+                                                  "rest: smoothing, ladder, copies",
+                                                  "whole frame"};
+
+SceneDot dot_of(const CameraModel& camera, const Vec3& position_mm, const Vec3& outward, double x_px,
+                double y_px) {
+    const Vec3 at = camera.camera_from_headset * (position_mm - camera.centre_mm);
+    const Vec3 normal = camera.camera_from_headset * outward;
+    SceneDot dot;
+    dot.x_px = x_px;
+    dot.y_px = y_px;
+    dot.long_px = kDotMm * camera.fx_px / at[2];
+    dot.short_px = dot.long_px * std::abs(normal.dot(at)) / at.norm();
+    dot.angle_rad = std::atan2(normal[1], normal[0]) + 1.5707963267948966;  // foreshortened along the normal
+    return dot;
+}
+
+std::vector<Picture> draw(const SyntheticFace& face, const SolvePack& pack, std::size_t frame) {
+    const double time_s = static_cast<double>(frame) / kRateHz;
+    SeededRandom random(7 + frame);
+    const std::vector<Vec3> points = moved(creeping_slip(time_s), face.positions(face.weights_at(time_s)));
+    std::vector<Picture> pictures;
+    for (std::size_t c = 0; c < kCameras; ++c) {
+        const SyntheticFace::View view = face.observe(c, points, 0.0, 0.0, 0, random);
+        Scene scene;
+        scene.width_px = pack.cameras[c].width_px;
+        scene.height_px = pack.cameras[c].height_px;
+        scene.seed = 100 * frame + c;
+        for (std::size_t i = 0; i < view.observations.size(); ++i) {
+            const auto k = static_cast<std::size_t>(view.marker[i]);
+            scene.dots.push_back(dot_of(pack.cameras[c], points[k], face.outward(k),
+                                        static_cast<double>(view.observations[i].x_px),
+                                        static_cast<double>(view.observations[i].y_px)));
+        }
+        pictures.push_back(render(scene));
+    }
+    return pictures;
+}
+
+// The stages as the pipeline strings them together, so that each can be timed: core has no clock.
+class StageChain {
+  public:
+    explicit StageChain(const SolvePack& pack) : pack_(pack) {
+        auto scratch = std::make_unique<ShapeModelWorkspace>();
+        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
+                          model_);
+        auto gaussian_scratch = std::make_unique<FaceGaussianWorkspace>();
+        build_face_gaussian(pack, model_, *gaussian_scratch, gaussian_);
+        reset_inference(inference_);
+        configure_solver(pack, kRateHz, solver_workspace_, solver_config_);
+        reset_solver(solver_);
+        tracker_config_.rate_hz = kRateHz;
+        ok_ = true;
+        for (Detector& detector : detectors_) {
+            ok_ = ok_ && detector.configure({}).has_value();
+            detector.reset();
+        }
+    }
+    [[nodiscard]] bool ok() const { return ok_; }
+    [[nodiscard]] std::size_t seen() const { return tracked_.seen; }
+
+    // us of each stage up to kSolve.
+    void step(std::int64_t capture_us, const std::vector<Picture>& pictures,
+              std::array<double, kStages>& times_us) {
+        double last_us = bench::thread_cpu_us();
+        const auto lap = [&](Stage stage) {
+            const double now_us = bench::thread_cpu_us();
+            times_us[stage] = now_us - last_us;
+            last_us = now_us;
+        };
+        for (std::size_t c = 0; c < kCameras; ++c) {
+            seen_[c].clear();
+            detectors_[c].detect(pictures[c].view(), seen_[c], detected_);
+        }
+        lap(kDetect);
+        sightings_.clear();
+        named_ = NamedMarkers{};
+        for (std::size_t c = 0; c < kCameras; ++c) {
+            const CameraModel& camera = pack_.cameras[c];
+            add_camera_view(camera, seen_[c].span(), kCentreSigmaPx, camera.centre_mm.norm(), sightings_);
+        }
+        track(model_, tracker_config_, sightings_, tracker_, tracker_workspace_, named_, tracked_);
+        lap(kTrack);
+        stabilise(model_, stabiliser_config_, named_, stabiliser_, stabiliser_workspace_, stabilised_,
+                  stabiliser_report_);
+        lap(kStabilise);
+        infer_missing(gaussian_, stabilised_, inference_, completed_);
+        lap(kInfer);
+        solve(solver_config_, stabilised_, completed_, capture_us, solver_, solver_workspace_, solved_,
+              solver_report_);
+        lap(kSolve);
+    }
+
+  private:
+    SolvePack pack_;
+    bool ok_ = false;
+    ShapeModel model_;
+    FaceGaussian gaussian_;
+    std::array<Detector, kCameras> detectors_;
+    std::array<Observations, kCameras> seen_;
+    DetectorReport detected_;
+    SightingSet sightings_;
+    TrackerConfig tracker_config_;
+    TrackerState tracker_;
+    TrackerWorkspace tracker_workspace_;
+    TrackerReport tracked_;
+    NamedMarkers named_;
+    StabiliserConfig stabiliser_config_;
+    StabiliserState stabiliser_;
+    StabiliserWorkspace stabiliser_workspace_;
+    StabiliserOutput stabilised_;
+    StabiliserReport stabiliser_report_;
+    InferenceWorkspace inference_;
+    InferenceOutput completed_;
+    SolverConfig solver_config_;
+    SolverState solver_;
+    SolverWorkspace solver_workspace_;
+    SolverOutput solved_;
+    SolverReport solver_report_;
+};
+
+double step_whole(Pipeline& pipeline, std::int64_t capture_us, const std::vector<Picture>& pictures,
+                  FaceState& state, FrameReport& report) {
+    FrameSet frame;
+    frame.capture_us = capture_us;
+    frame.camera_count = kCameras;
+    for (std::size_t c = 0; c < kCameras; ++c) {
+        frame.images[c] = pictures[c].view();
+        frame.status[c] = CameraStatus::kGood;
+    }
+    const double began_us = bench::thread_cpu_us();
+    pipeline.step(frame, state, report);
+    return bench::thread_cpu_us() - began_us;
+}
+
+}  // namespace
+
+void print_stage_times(std::size_t frames) {
+    SyntheticFaceOptions options;
+    options.marker_count = kMarkers;
+    options.shape_count = 53;
+    options.camera_count = kCameras;
+    options.temporal_gamma_mm2 = 10.0;
+    const SyntheticFace face(options);
+    const SolvePack pack = face.pack();
+    const auto chain = std::make_unique<StageChain>(pack);
+    const auto pipeline = std::make_unique<Pipeline>();
+    if (!chain->ok() || !pipeline->configure(pack, {})) return;
+    const auto state = std::make_unique<FaceState>();
+    const auto report = std::make_unique<FrameReport>();
+    std::array<std::vector<double>, kStages> times_us;
+    double seen = 0.0;
+    for (std::size_t f = 0; f < frames; ++f) {
+        const std::vector<Picture> pictures = draw(face, pack, f);
+        const auto capture_us = static_cast<std::int64_t>(static_cast<double>(f) / kRateHz * 1e6);
+        std::array<double, kStages> one{};
+        // In turns: who comes second finds the pictures in the cache.
+        if (f % 2 == 0) chain->step(capture_us, pictures, one);
+        one[kAll] = step_whole(*pipeline, capture_us, pictures, *state, *report);
+        if (f % 2 == 1) chain->step(capture_us, pictures, one);
+        one[kRest] = one[kAll];
+        for (std::size_t s = kDetect; s < kRest; ++s) one[kRest] -= one[s];
+        for (std::size_t s = 0; s < kStages; ++s) times_us[s].push_back(one[s]);
+        seen += static_cast<double>(chain->seen()) / static_cast<double>(frames);
+    }
+    fmt::print(
+        "\npictures to weights by stage, {} frames of two 640 x 480 pictures, {:.1f} of {} markers seen; "
+        "rest is the whole less the stages\n\n| stage | p50 us | p99 us |\n|---|---|---|\n",
+        frames, seen, kMarkers);
+    for (std::size_t s = 0; s < kStages; ++s) {
+        fmt::print("| {} | {:.0f} | {:.0f} |\n", kNames[s], bench::quantile(times_us[s], 0.5),
+                   bench::quantile(times_us[s], 0.99));
+    }
+}
+
+}  // namespace rig::test
