@@ -13,6 +13,7 @@
 #include "core/solve/simplex_qp.hpp"
 #include "core/solve/solver.hpp"
 #include "tests/replay/solver_digests/geometry_digest.hpp"
+#include "tests/replay/solver_digests/tracking_digest.hpp"
 #include "tests/support/digest.hpp"
 #include "tests/support/random.hpp"
 #include "tests/support/solver_problems.hpp"
@@ -261,6 +262,7 @@ int main() {
          {SolverKind::kLeastSquares, SolverKind::kNonNegative, SolverKind::kBoxQp, SolverKind::kRbf})
         run_stage(solver, digest);
     add_geometry(digest);
+    add_tracking(digest);
     std::printf("%016llx\n", static_cast<unsigned long long>(digest.value()));
     return 0;
 }
