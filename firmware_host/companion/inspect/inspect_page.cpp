@@ -44,9 +44,9 @@ void timeline(const TakeRecord& record, Page& page) {
 void states(const TakeRecord& record, const InspectFigures& figures, Page& page) {
     page.heading("Tracking state");
     page.figure(state_ribbons(record),
-                "LIVE: tracked. PARTIAL: parts are not seen well. HOLD: the last good face is held. LOST: "
-                "for longer. "
-                "SAFE: no face yet. A column shows the worst of its frames.");
+                "LIVE: tracked. PARTIAL: parts are not seen well. HOLD: no face just now, the last good one "
+                "is held. LOST: for "
+                "longer. SAFE: the rig has no pack. A column shows the worst of its frames.");
     page.heading("Faults");
     if (figures.faults.empty()) {
         page.paragraph("None was raised.");
@@ -77,12 +77,12 @@ void curves(const TakeRecord& record, const InspectFigures& figures, Page& page)
     page.figure(tick_curve(record, "rotation, deg", [](const TakeTick& tick) { return tick.slip_deg; },
                            {{fmt::format("alarm {:.1f} deg", kSlipAlarmDeg), kSlipAlarmDeg}}),
                 "Angle between the helmet as calibrated and as worn.");
-    page.figure(
-        tick_curve(record, "translation, mm", [](const TakeTick& tick) { return tick.slip_mm; },
-                   {{fmt::format("alarm {:.1f} mm", kSlipAlarmMm), kSlipAlarmMm}}),
-        fmt::format("Way of the face's origin, between the eyes. {} frames lie beyond an alarm, which raises "
-                    "F20: re-seat the rig.",
-                    figures.slip_alarm_ticks));
+    page.figure(tick_curve(record, "translation, mm", [](const TakeTick& tick) { return tick.slip_mm; },
+                           {{fmt::format("alarm {:.1f} mm", kSlipAlarmMm), kSlipAlarmMm}}),
+                fmt::format("How far the face's origin, between the eyes, has moved in the helmet. {} frames "
+                            "lie beyond an alarm, which raises "
+                            "F20: re-seat the rig.",
+                            figures.slip_alarm_ticks));
 }
 
 std::string histogram(const Histogram& of, const std::string& x_name, const std::string& y_name) {

@@ -47,6 +47,9 @@ Result<void, FileError> check_stream(const InspectRequest& request, const SolveP
                     slots, request.pack_name, pack.marker_count));
 }
 
+constexpr double kSamePlace_mm =
+    0.5;  // a tracked place leans towards the fitted face; markers are farther apart
+
 // A named row that was taken for a marker lies where that marker was seen; a dropped name is nobody's.
 std::vector<std::int16_t> labels_of_named(const SolvePack& pack, const Pipeline& pipeline,
                                           std::span<const Vec3> positions) {
@@ -54,7 +57,7 @@ std::vector<std::int16_t> labels_of_named(const SolvePack& pack, const Pipeline&
     for (std::size_t s = 0; s < positions.size(); ++s) {
         for (std::size_t k = 0; k < pack.marker_count; ++k) {
             const NamedMarker& marker = pipeline.named_markers().markers[k];
-            const bool mine = marker.seen && (marker.position_mm - positions[s]).norm() < 1e-3;
+            const bool mine = marker.seen && (marker.position_mm - positions[s]).norm() < kSamePlace_mm;
             if (mine) labels[s] = static_cast<std::int16_t>(k);
         }
     }

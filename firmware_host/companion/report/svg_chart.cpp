@@ -17,6 +17,7 @@ constexpr double kRightPx = 20.0;
 constexpr double kTopPx = 14.0;
 constexpr double kBottomPx = 48.0;
 constexpr double kLegendPx = 14.0;
+constexpr double kEventsPx = 12.0;
 // Text, axes and grid take the page's own colour; these are told from white and from near black.
 constexpr std::array kColours{"#3b82c4", "#d9773f", "#3f9e6b", "#9a6fc4", "#b8952b", "#8a8a8a"};
 constexpr std::string_view kAxis = "stroke=\"currentColor\" stroke-opacity=\"0.7\"";
@@ -154,7 +155,7 @@ std::string draw_events(const Frame& frame, const LineChart& chart) {
         std::string path;
         for (const double x : chart.events[e].x) {
             if (!std::isfinite(x) || x < frame.x.low || x > frame.x.high) continue;
-            path += fmt::format("M{:.1f} {:.1f}v9", frame.x_px(x), frame.top_px);
+            path += fmt::format("M{:.1f} {:.1f}v9", frame.x_px(x), frame.top_px - kEventsPx + 1.0);
         }
         if (!path.empty())
             out += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>\n", path,
@@ -286,6 +287,7 @@ std::string line_chart(const LineChart& chart) {
     const bool crowd = chart.series.size() > kColours.size();
     const bool legend = (chart.series.size() > 1 && !crowd) || !chart.events.empty();
     if (legend) frame.top_px += kLegendPx;
+    if (!chart.events.empty()) frame.top_px += kEventsPx;
     std::string out = open_svg(chart.width_px, chart.height_px, chart.y_name + " against " + chart.x_name);
     out += draw_axes(frame, chart.x_name, chart.y_name);
     if (chart.marked_x && frame.x.shows(*chart.marked_x)) {

@@ -25,7 +25,7 @@ struct ChartLevel {
     double y = 0.0;
 };
 
-// Short strokes at the top of a chart, one at each x: when something happened.
+// Short strokes above a chart, one at each x: when something happened.
 struct ChartEvents {
     std::string name;
     std::vector<double> x;

@@ -149,7 +149,9 @@ TEST_F(TakeRuns, AStreamsHiddenMarkerIsInferredAndItsOwnRow) {
     EXPECT_GT(*figures.residual_median_mm, 0.0);
     EXPECT_FALSE(record->counts_ghosts);
     ASSERT_FALSE(record->moments.empty());
-    EXPECT_EQ(record->moments.front().views.front().blobs.size(), kMarkers);
+    const std::vector<SceneBlob>& blobs = record->moments.front().views.front().blobs;
+    ASSERT_EQ(blobs.size(), kMarkers);
+    for (std::size_t k = 0; k < kMarkers; ++k) EXPECT_EQ(blobs[k].marker, static_cast<int>(k));
 }
 
 TEST_F(TakeRuns, AStreamWithoutAFaceIsLost) {
