@@ -98,6 +98,15 @@ void add_markers(const MarkerFrame* frame, TakeRecord& record) {
     }
 }
 
+void name_cameras(TakeRecord& record) {
+    for (std::size_t c = 0; c < kMaxCameras; ++c) {
+        const bool used = std::ranges::any_of(
+            record.ticks, [c](const TakeTick& tick) { return tick.cameras[c] != CameraStatus::kUnused; });
+        if (!used) return;
+        record.cameras.push_back(std::to_string(c + 1));
+    }
+}
+
 Result<void, FileError> set_markers(const InspectRequest& request, const SolvePack* pack,
                                     const Streamed& streamed, TakeRecord& record) {
     if (streamed.markers.empty()) {
@@ -157,6 +166,7 @@ Result<TakeRecord, FileError> inspect_recording(const InspectRequest& request, c
             add_markers(frame == streamed.markers.end() ? nullptr : &frame->second, record);
         if (!progress(i + 1, streamed.states.size())) break;
     }
+    name_cameras(record);
     // A stream with divider d steps by d; the smallest step seen stands for it.
     if (steps > 0) record.missing_ticks = steps / smallest_step - (record.ticks.size() - 1);
     if (streamed.unread_bytes > 0)

@@ -238,6 +238,8 @@ TEST_F(TakeRuns, ARecordingIsShownAsItWasStreamed) {
         state.state = t < 50 ? TrackingState::kLive : TrackingState::kHold;
         state.held = t >= 50;
         state.shape_count = 5;
+        state.cameras = {CameraStatus::kGood, CameraStatus::kMissing, CameraStatus::kUnused,
+                         CameraStatus::kUnused};
         state.slip.translation_mm = {3.0F, 4.0F, 0.0F};
         state.faults = t >= 50 ? fault_bit(Fault::kMarkersLost) : 0;
         const auto weights = encode_weights(state, 0, payload);
@@ -265,6 +267,7 @@ TEST_F(TakeRuns, ARecordingIsShownAsItWasStreamed) {
         const InspectFigures figures = figures_of(*record);
         EXPECT_EQ(figures.ticks, 58U);
         EXPECT_EQ(record->missing_ticks, 2U);
+        EXPECT_EQ(record->cameras, (std::vector<std::string>{"1", "2"}));
         EXPECT_NEAR(figures.slip_max_mm->value, 5.0, 0.02);
         EXPECT_NEAR(figures.markers[3].inferred, 9.0 / 58.0, 1e-9);
         EXPECT_NEAR(figures.lost, 10.0 / 58.0, 1e-9);
