@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "firmware_host/companion/inspect/take_charts.hpp"
 #include "firmware_host/companion/inspect/take_figures.hpp"
@@ -61,6 +62,19 @@ void states(const TakeRecord& record, const InspectFigures& figures, Page& page)
                         false});
     }
     page.table({"fault", "frames", "of all %", "times raised", "first at s"}, rows);
+}
+
+void camera_drift(const TakeRecord& record, Page& page) {
+    const auto shift = [](const TakeTick& tick) { return tick.camera_shift_px; };
+    const bool known =
+        std::ranges::any_of(record.ticks, [&](const TakeTick& t) { return std::isfinite(shift(t)); });
+    if (!known) return;
+    const double limit_px = MountDriftConfig{}.raise_px;
+    page.heading("Cameras on the helmet");
+    page.figure(
+        tick_curve(record, "shift, px", shift, {{fmt::format("alarm {:.1f} px", limit_px), limit_px}}),
+        "How far the picture of the worst camera has moved since calibration, by the helmet's reference "
+        "marks.");
 }
 
 void curves(const TakeRecord& record, const InspectFigures& figures, Page& page) {
@@ -162,10 +176,11 @@ void moments(const TakeRecord& record, Page& page) {
     if (record.moments.empty()) return;
     page.heading("Moments to look at");
     page.paragraph(
-        "Green ring with name: a blob and the marker that it was taken for. Pink square: a blob that nobody "
-        "took, a "
-        "ghost. Orange diamond: where a hidden marker must be. Blue cross: a marker that only another camera "
-        "sees.");
+        "Green ring with name: a blob and the marker that it was taken for. Pink square: a blob that no "
+        "marker took, "
+        "a ghost or a mark of the helmet. Orange diamond: where a hidden marker must be. Blue cross: a "
+        "marker that "
+        "only another camera sees.");
     for (const Moment& moment : record.moments) {
         std::string reasons;
         for (const std::string& reason : moment.reasons) reasons += (reasons.empty() ? "" : "; ") + reason;
@@ -188,6 +203,7 @@ std::string inspect_page(const TakeRecord& record) {
     timeline(record, page);
     states(record, figures, page);
     curves(record, figures, page);
+    camera_drift(record, page);
     histograms(record, page);
     worst_markers(record, figures, page);
     moments(record, page);

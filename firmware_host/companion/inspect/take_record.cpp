@@ -100,8 +100,13 @@ void add_tick(const SolvePack& pack, const Pipeline& pipeline, const FaceState& 
     tick.cameras = state.cameras;
     tick.swaps_repaired = report.swaps_repaired;
     tick.names_rejected = report.names_rejected;
+    std::size_t marks = 0;
+    for (const MountDriftReport& mount : report.mounts) {
+        marks += mount.marks_used;
+        if (mount.marks_used > 0) tick.camera_shift_px = std::fmax(tick.camera_shift_px, mount.shift_px);
+    }
     if (report.solved) {
-        const std::size_t given = names_given(pack, pipeline);
+        const std::size_t given = marks + names_given(pack, pipeline);
         tick.ghosts = static_cast<std::uint16_t>(offered > given ? offered - given : 0);
         tick.residual_rms_mm = report.residual_rms_mm;
         tick.slip_deg = slip_angle_deg(state.slip);

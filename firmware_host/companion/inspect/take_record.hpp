@@ -40,10 +40,13 @@ struct TakeTick {
     std::array<CameraStatus, kMaxCameras> cameras{};
     std::uint16_t swaps_repaired = 0;  // names that changed
     std::uint16_t names_rejected = 0;
-    std::uint16_t ghosts = 0;  // blobs or points that no marker took, while names were known
+    std::uint16_t ghosts =
+        0;  // blobs or points that neither marker nor helmet mark took, while names were known
     double residual_rms_mm = std::numeric_limits<double>::quiet_NaN();  // over the coordinates solved with
     double slip_deg = std::numeric_limits<double>::quiet_NaN();
     double slip_mm = std::numeric_limits<double>::quiet_NaN();
+    // How far the worst camera's picture has moved on the helmet; NaN on rigs without reference marks.
+    double camera_shift_px = std::numeric_limits<double>::quiet_NaN();
 };
 
 // Equal bins over [low, high); what is outside falls into the first or last one.

@@ -77,6 +77,15 @@ TEST(InspectPage, SaysWhatATakeDoesNotTell) {
     EXPECT_FALSE(has(html, "nan"));
 }
 
+TEST(InspectPage, ShowsCamerasThatMovedWhereMarksTellIt) {
+    TakeRecord record = long_record();
+    EXPECT_FALSE(has(inspect_page(record), "Cameras on the helmet"));
+    record.ticks[500].camera_shift_px = 3.5;
+    const std::string html = inspect_page(record);
+    EXPECT_TRUE(has(html, "Cameras on the helmet"));
+    EXPECT_TRUE(has(html, "alarm 0.5 px"));
+}
+
 TEST(InspectPage, OfNoFrames) {
     const std::string html = inspect_page(TakeRecord{});
     EXPECT_TRUE(has(html, "0 frames"));
