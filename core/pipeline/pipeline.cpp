@@ -15,8 +15,6 @@ constexpr double kCentreSigmaPx = 0.15;  // of a detected centre: measured on re
 constexpr double kNominalDepthMm = 200.0;   // helmet camera to face, when the calibration does not tell
 constexpr std::uint32_t kWholeImageEvery = 32;  // frames, of each camera
 constexpr std::int64_t kDecayUs = 400'000;  // to the rest pose, policy kDecay
-constexpr double kSlipAlarmRad = 0.07;      // about 4 degrees: re-seat the rig
-constexpr double kSlipAlarmMm = 8.0;
 constexpr float kObservable = 0.5F;    // confidence, everything visible, from which a shape counts as seen
 constexpr float kPartialShare = 0.5F;  // of that confidence, under which its region is not seen any more
 

@@ -21,6 +21,10 @@
 
 namespace rig {
 
+// Slip beyond either of these raises kRigMoved: re-seat the rig. About 4 degrees.
+inline constexpr double kSlipAlarmRad = 0.07;
+inline constexpr double kSlipAlarmMm = 8.0;
+
 // kFilter: a window, a kind of filter or the delay is outside its range.
 enum class PipelineError : std::uint8_t { kPackLimits, kRate, kFilter };
 

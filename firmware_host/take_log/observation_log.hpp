@@ -121,6 +121,10 @@ class ObservationLogReader {
     [[nodiscard]] static Result<ObservationLogReader, ObservationLogError> open(ByteSpan bytes);
     [[nodiscard]] const ObservationLogHeader& header() const { return header_; }
     [[nodiscard]] bool at_end() const { return position_ == bytes_.size(); }
+    // Of the bytes, 0..1: for progress.
+    [[nodiscard]] double share_read() const {
+        return static_cast<double>(position_) / static_cast<double>(bytes_.size());
+    }
     // The next tick; its spans are valid until the next call. kCut and kDamaged are final.
     // Precondition: !at_end().
     [[nodiscard]] Result<ObservationTick, ObservationLogError> next();

@@ -135,17 +135,31 @@ void draw_circles(const BoardSpec& board, double px_per_mm, cv::Mat& picture) {
     }
 }
 
-void draw_check_line(const std::string& words, double px_per_mm, double margin_mm, cv::Mat& page) {
-    constexpr double kLineMm = 100.0;
+// The longest round line that the page has room for.
+double check_line_mm(double room_mm) {
+    for (const double length_mm : {100.0, 50.0, 20.0}) {
+        if (length_mm <= room_mm) return length_mm;
+    }
+    return 10.0;
+}
+
+// Line and words in the margin under the board, a quarter of the margin away from it: marks want white around
+// them. Words as wide as the board at most.
+void draw_check_line(const std::string& words, double line_mm, double px_per_mm, double margin_mm,
+                     cv::Mat& page) {
     const int left = cvRound(px_per_mm * margin_mm);
-    const int y = page.rows - cvRound(px_per_mm * 0.5 * margin_mm);
-    const int end = left + cvRound(px_per_mm * kLineMm);
-    const int tick = cvRound(px_per_mm * 1.5);
+    const int y = page.rows - cvRound(px_per_mm * 0.6 * margin_mm);
+    const int end = left + cvRound(px_per_mm * line_mm);
+    const int tick = cvRound(px_per_mm * 0.1 * margin_mm);
     const int thick = std::max(1, cvRound(px_per_mm * 0.15));
     cv::line(page, {left, y}, {end, y}, cv::Scalar(0), thick);
     for (const int x : {left, end}) cv::line(page, {x, y - tick}, {x, y + tick}, cv::Scalar(0), thick);
-    cv::putText(page, words, {left, y - 2 * tick}, cv::FONT_HERSHEY_SIMPLEX, px_per_mm * 0.08, cv::Scalar(0),
-                thick, cv::LINE_AA);
+    int below = 0;
+    double size = px_per_mm * 0.08;
+    const int width = cv::getTextSize(words, cv::FONT_HERSHEY_SIMPLEX, size, thick, &below).width;
+    size *= std::min(1.0, static_cast<double>(page.cols - 2 * left) / std::max(1, width));
+    cv::putText(page, words, {left, page.rows - cvRound(px_per_mm * 0.15 * margin_mm)},
+                cv::FONT_HERSHEY_SIMPLEX, size, cv::Scalar(0), thick, cv::LINE_AA);
 }
 
 // Pixels a millimetre, about 600 an inch, at which squares and markers are whole numbers of pixels.
@@ -251,15 +265,16 @@ Result<PrintedSize, FileError> write_printable_board(const std::filesystem::path
     const double px_per_mm = printing_resolution(board);
     GreyImage image = draw_board(board, px_per_mm, kPrintedMarginMm);
     cv::Mat page(image.height_px, image.width_px, CV_8UC1, image.pixels.data());
-    draw_check_line(fmt::format("{}  print at 100 %; this line is 100 mm", board_text(board)), px_per_mm,
-                    kPrintedMarginMm, page);
+    const double line_mm = check_line_mm(image.width_px / px_per_mm - 2.0 * kPrintedMarginMm);
+    draw_check_line(fmt::format("{}  print at 100 %; this line is {:.0f} mm", board_text(board), line_mm),
+                    line_mm, px_per_mm, kPrintedMarginMm, page);
     std::vector<std::uint8_t> png;
     if (!cv::imencode(".png", page, png)) return file_failure(path, "cannot be encoded");
     std::ofstream out(path, std::ios::binary | std::ios::trunc);
     out << with_resolution(png, px_per_mm);
     out.close();
     if (!out) return file_failure(path, "cannot be written; does the folder exist and is there space?");
-    return PrintedSize{image.width_px / px_per_mm, image.height_px / px_per_mm, px_per_mm};
+    return PrintedSize{image.width_px / px_per_mm, image.height_px / px_per_mm, px_per_mm, line_mm};
 }
 
 }  // namespace rig::host

@@ -50,12 +50,13 @@ struct BoardPoint {
 // ChArUco.
 [[nodiscard]] GreyImage draw_board(const BoardSpec& board, double px_per_mm, double margin_mm);
 
-// A PNG to print: the board, a line of 100 mm and words to check the print with, and the resolution in the
-// file, so that 100 % is the right size.
+// A PNG to print: the board, a line of 100 mm (50, 20 or 10 on a smaller board) and words to check the print
+// with, and the resolution in the file, so that 100 % is the right size.
 struct PrintedSize {
     double width_mm = 0.0;
     double height_mm = 0.0;
     double px_per_mm = 0.0;
+    double line_mm = 0.0;
 };
 [[nodiscard]] Result<PrintedSize, FileError> write_printable_board(const std::filesystem::path& path,
                                                                    const BoardSpec& board);

@@ -43,9 +43,10 @@ int make_board(const CalibrateCommand& command, const BoardSpec& board) {
     fmt::print("{}: {} on {:.1f} x {:.1f} mm at {:.1f} px/mm\n", command.make_board, board_text(board),
                printed->width_mm, printed->height_mm, printed->px_per_mm);
     fmt::print(
-        "Print it at 100 %, glue it flat, and measure: if the line is not 100.0 mm long, scale the sizes "
+        "Print it at 100 %, glue it flat, and measure: if the line is not {:.1f} mm long, scale the sizes "
         "given to "
-        "--board by what it measures.\n");
+        "--board by what it measures.\n",
+        printed->line_mm);
     return kExitOk;
 }
 

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <opencv2/imgproc.hpp>
 #include <string>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include "firmware_host/companion/commands/console.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/files/image_file.hpp"
+#include "firmware_host/companion/inspect/detection_overlay.hpp"
 
 namespace rig::host {
 
@@ -27,36 +27,6 @@ struct DetectOptions {
     std::string overlay;
     bool report = false;
 };
-
-// With several images every picture gets its image's name: out.png -> out_f00700_c.png.
-std::filesystem::path overlay_path(const DetectOptions& options, const std::string& stem) {
-    const std::filesystem::path path = options.overlay;
-    if (options.images.size() == 1) return path;
-    return path.parent_path() / (path.stem().string() + "_" + stem + path.extension().string());
-}
-
-Result<void, FileError> write_overlay(const std::filesystem::path& path, const GreyImage& image,
-                                      const Observations& observations) {
-    constexpr int kZoom = 2;
-    const cv::Mat grey(image.height_px, image.width_px, CV_8UC1,
-                       const_cast<std::uint8_t*>(image.pixels.data()));
-    cv::Mat picture;
-    cv::resize(grey, picture, {}, kZoom, kZoom, cv::INTER_NEAREST);
-    cv::cvtColor(picture, picture, cv::COLOR_GRAY2RGB);
-    constexpr int kShift = 4;  // OpenCV draws at sixteenths of a pixel
-    const auto fixed = [](double px) { return cvRound(((px + 0.5) * kZoom - 0.5) * (1 << kShift)); };
-    for (const Observation& seen : observations) {
-        const cv::Point centre(fixed(static_cast<double>(seen.x_px)), fixed(static_cast<double>(seen.y_px)));
-        const int radius =
-            cvRound((0.5 * static_cast<double>(seen.diameter_px) + 2.0) * kZoom * (1 << kShift));
-        const cv::Scalar colour(255.0 * (1.0 - static_cast<double>(seen.score)),
-                                255.0 * static_cast<double>(seen.score), 64.0);
-        cv::circle(picture, centre, radius, colour, 1, cv::LINE_AA, kShift);
-        cv::circle(picture, centre, 1 << kShift, {255, 64, 64}, cv::FILLED, cv::LINE_AA, kShift);
-    }
-    const std::vector<std::uint8_t> rgb(picture.datastart, picture.dataend);
-    return write_rgb_image(path, picture.cols, picture.rows, rgb);
-}
 
 void print_observations(const std::string& stem, const Observations& observations) {
     for (const Observation& seen : observations) {
@@ -91,12 +61,22 @@ int run_detect(const DetectOptions& options) {
                                 options.min_diameter_px, options.max_diameter_px, kMaxDotDiameterPx));
         return kExitUsage;
     }
+    const std::vector<std::filesystem::path> images(options.images.begin(), options.images.end());
+    std::vector<std::filesystem::path> overlays;
+    if (!options.overlay.empty()) {
+        auto paths = overlay_paths(options.overlay, images);
+        if (!paths) {
+            print_error(paths.error().message);
+            return kExitUsage;
+        }
+        overlays = std::move(*paths);
+    }
     const auto observations = std::make_unique<Observations>();
     int exit_code = kExitOk;
     fmt::print("image,x_px,y_px,diameter_px,contrast,score\n");
     Progress progress("detect", options.images.size());
-    for (std::size_t i = 0; i < options.images.size() && !interrupted(); ++i) {
-        const std::filesystem::path path = options.images[i];
+    for (std::size_t i = 0; i < images.size() && !interrupted(); ++i) {
+        const std::filesystem::path& path = images[i];
         const auto image = read_grey_image(path);
         if (!image) {
             print_error(image.error().message);
@@ -114,10 +94,8 @@ int run_detect(const DetectOptions& options) {
         }
         print_observations(path.stem().string(), *observations);
         if (options.report) print_report(path.stem().string(), report);
-        if (!options.overlay.empty()) {
-            const auto written =
-                write_overlay(overlay_path(options, path.stem().string()), *image, *observations);
-            if (!written) {
+        if (!overlays.empty()) {
+            if (const auto written = draw_detections(overlays[i], *image, observations->span()); !written) {
                 print_error(written.error().message);
                 return kExitOutput;
             }
@@ -147,16 +125,20 @@ void add_detect_verb(CLI::App& app, int& exit_code) {
     verb->add_option("--max-diameter", options->max_diameter_px, "greatest diameter of a marker, px")
         ->capture_default_str()
         ->type_name("PX");
-    verb->add_option("--overlay", options->overlay,
-                     "picture with the markers circled; several images: name_<image>.png")
-        ->type_name("PNG");
+    verb->add_option(
+            "--overlay", options->overlay,
+            "picture of what was found; for several images a folder, or NAME.png for NAME_<image>.png")
+        ->type_name("PNG|DIR");
     verb->add_flag("--report", options->report,
                    "what was looked at and why it was rejected, on standard error");
     verb->footer(
         "Columns: image (file name without ending), x_px, y_px (integers are pixel centres), diameter_px, "
         "contrast "
-        "(0..1), score (0..1).\nExamples:\n  headrig detect take/*.png > dots.csv\n"
-        "  headrig detect frame.pgm --polarity bright --overlay frame_dots.png");
+        "(0..1), score (0..1).\nOverlays: outline of each blob "
+        "from red (score 0) to green (1), a cross at its centre, its row among the image's rows from 0."
+        "\nExamples:\n  headrig detect take/*.png > dots.csv\n"
+        "  headrig detect frame.pgm --polarity bright --overlay frame_dots.png\n"
+        "  headrig detect take/*.png --overlay dots/ > dots.csv");
     verb->callback([options, &exit_code] {
         install_interrupt_handler();
         exit_code = run_detect(*options);

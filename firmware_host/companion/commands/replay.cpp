@@ -34,15 +34,15 @@ int run_replay(const ReplayOptions& options) {
     CsvWriter csv(columns);
     std::int64_t row = 0;
     install_interrupt_handler();
-    const auto replayed = replay_log({options.log, options.pack, options.another_pack}, *opened,
-                                     [&](const FaceState& state, double time_s) {
-                                         csv.integer(row++).number(time_s, 6);
-                                         for (std::size_t i = 0; i < pack.shape_count; ++i) {
-                                             csv.number(static_cast<double>(state.weights[i]), 6);
-                                         }
-                                         csv.end_row();
-                                         return !interrupted();
-                                     });
+    const auto replayed =
+        replay_log({options.log, options.pack, options.another_pack}, *opened, [&](const ReplayedTick& tick) {
+            csv.integer(row++).number(tick.time_s, 6);
+            for (std::size_t i = 0; i < pack.shape_count; ++i) {
+                csv.number(static_cast<double>(tick.state.weights[i]), 6);
+            }
+            csv.end_row();
+            return !interrupted();
+        });
     if (interrupted()) return kExitInterrupted;
     if (!replayed) {
         print_error(replayed.error().message);

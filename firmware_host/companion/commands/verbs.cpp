@@ -20,6 +20,7 @@ void add_all_verbs(CLI::App& app, int& exit_code) {
     add_monitor_verb(app, exit_code);
     add_record_verb(app, exit_code);
     add_replay_verb(app, exit_code);
+    add_inspect_verb(app, exit_code);
     add_status_verb(app, exit_code);
     add_control_verb(app, exit_code);
     add_info_verb(app, exit_code);

@@ -24,6 +24,7 @@ void add_experiment_verb(CLI::App& app, int& exit_code);
 void add_fit_verb(CLI::App& app, int& exit_code);
 void add_import_verb(CLI::App& app, int& exit_code);
 void add_info_verb(CLI::App& app, int& exit_code);
+void add_inspect_verb(CLI::App& app, int& exit_code);
 void add_keyshapes_verb(CLI::App& app, int& exit_code);
 void add_monitor_verb(CLI::App& app, int& exit_code);
 void add_pack_verb(CLI::App& app, int& exit_code);

@@ -390,7 +390,7 @@ void fill_figures(const Stage& stage, const WorldServer& server, const HostSessi
 Result<std::uint64_t, FileError> replay_digest(const DemoOptions& options, const OpenedPack& pack) {
     const ReplayRequest request{options.out_folder / "take.rgo", (options.out_folder / "face.pack").string(),
                                 false};
-    const auto replayed = replay_log(request, pack, [](const FaceState&, double) { return true; });
+    const auto replayed = replay_log(request, pack, [](const ReplayedTick&) { return true; });
     if (!replayed) return failure(replayed.error());
     return replayed->digest;
 }

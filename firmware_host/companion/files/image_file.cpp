@@ -200,4 +200,25 @@ Result<void, FileError> write_rgb_image(const std::filesystem::path& path, int w
     return write_mat(path, bgr, ".png");
 }
 
+std::vector<std::uint8_t> encode_jpeg(const GreyImage& image, int quality) {
+    RIG_CHECK(!image.view().empty() && quality >= 1 && quality <= 100);
+    const cv::Mat mat(image.height_px, image.width_px, CV_8UC1,
+                      const_cast<std::uint8_t*>(image.pixels.data()));
+    std::vector<std::uint8_t> encoded;
+    RIG_CHECK(cv::imencode(".jpg", mat, encoded, {cv::IMWRITE_JPEG_QUALITY, quality}));
+    return encoded;
+}
+
+std::vector<std::uint8_t> encode_rgba_png(int width_px, int height_px,
+                                          const std::vector<std::uint8_t>& rgba) {
+    RIG_CHECK(width_px > 0 && height_px > 0 &&
+              rgba.size() == 4 * static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px));
+    const cv::Mat view(height_px, width_px, CV_8UC4, const_cast<std::uint8_t*>(rgba.data()));
+    cv::Mat bgra;
+    cv::cvtColor(view, bgra, cv::COLOR_RGBA2BGRA);
+    std::vector<std::uint8_t> encoded;
+    RIG_CHECK(cv::imencode(".png", bgra, encoded));
+    return encoded;
+}
+
 }  // namespace rig::host

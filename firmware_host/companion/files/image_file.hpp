@@ -43,4 +43,10 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1}
 [[nodiscard]] Result<void, FileError> write_rgb_image(const std::filesystem::path& path, int width_px,
                                                       int height_px, const std::vector<std::uint8_t>& rgb);
 
+// For pictures inside a page. jpeg quality: 1..100. rgba: 4 bytes a pixel, rows without gaps.
+// Precondition: the image is not empty and has as many pixels as it says.
+[[nodiscard]] std::vector<std::uint8_t> encode_jpeg(const GreyImage& image, int quality);
+[[nodiscard]] std::vector<std::uint8_t> encode_rgba_png(int width_px, int height_px,
+                                                        const std::vector<std::uint8_t>& rgba);
+
 }  // namespace rig::host

@@ -2,7 +2,6 @@
 
 #include <memory>
 
-#include "core/pipeline/pipeline.hpp"
 #include "firmware_host/companion/files/whole_file.hpp"
 #include "firmware_host/take_log/observation_log.hpp"
 #include "firmware_host/take_log/stream_digest.hpp"
@@ -62,14 +61,16 @@ Result<void, FileError> check_fit(const ReplayRequest& request, const OpenedPack
 }  // namespace
 
 Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const OpenedPack& pack,
-                                           const ReplayedTick& tick) {
+                                           const ReplayVisitor& visit) {
     const auto bytes = read_whole_file(request.log);
     if (!bytes) return failure(bytes.error());
     auto reader = ObservationLogReader::open(*bytes);
     if (!reader) return failure(FileError{request.log.string() + ": " + fault_of(reader.error())});
     if (const auto fits = check_fit(request, pack, reader->header()); !fits) return failure(fits.error());
     const auto pipeline = std::make_unique<Pipeline>();
-    if (!pipeline->configure(pack.pack(), config_of(reader->header()))) {
+    PipelineConfig config = config_of(reader->header());
+    config.filter = config.filter && !request.as_solved;
+    if (!pipeline->configure(pack.pack(), config)) {
         return failure(FileError{request.pack_name +
                                  ": the solver refuses this pack; train it again with this version"});
     }
@@ -77,6 +78,7 @@ Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const O
     const auto report = std::make_unique<FrameReport>();
     StreamDigest digest;
     ReplayResult result;
+    result.rate_hz = config.rate_hz;
     std::int64_t first_us = 0;
     while (!reader->at_end()) {
         const auto next = reader->next();
@@ -85,14 +87,17 @@ Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const O
             break;
         }
         if (next->reset_before) pipeline->reset_tracking();
-        if (next->new_controls != nullptr && !pipeline->set_controls(*next->new_controls)) {
+        result.controls = result.controls || next->new_controls != nullptr;
+        const bool control = next->new_controls != nullptr && !request.as_solved;
+        if (control && !pipeline->set_controls(*next->new_controls)) {
             return failure(FileError{request.log.string() + ": sets controls of shapes that " +
                                      request.pack_name + " does not have"});
         }
         pipeline->step(frame_of(*next, reader->header().camera_count), *state, *report);
         digest.add(*state);
         if (digest.ticks() == 1) first_us = next->capture_us;
-        if (!tick(*state, static_cast<double>(next->capture_us - first_us) * 1e-6)) break;
+        const double time_s = static_cast<double>(next->capture_us - first_us) * 1e-6;
+        if (!visit({*state, *report, *pipeline, next->reset_before, time_s, reader->share_read()})) break;
     }
     result.digest = digest.value();
     result.ticks = digest.ticks();

@@ -22,6 +22,7 @@ figure { margin: .8em 0; break-inside: avoid; }
 figcaption { color: var(--soft); font-size: .9em; max-width: 46em; }
 /* Wide charts and tables are pushed sideways on a small screen, not shrunk until nobody can read them. */
 .wide { overflow-x: auto; }
+.row { display: flex; flex-wrap: wrap; gap: 10px; }
 svg { display: block; }
 table { border-collapse: collapse; margin: .6em 0; font-variant-numeric: tabular-nums; }
 thead { display: table-header-group; }
@@ -85,6 +86,12 @@ void Page::figure(std::string_view svg, std::string_view caption) {
                          escaped(caption));
 }
 
+void Page::figures(const std::vector<std::string>& svgs, std::string_view caption) {
+    body_ += "<figure><div class=\"row wide\">";
+    for (const std::string& svg : svgs) body_ += fmt::format("<div>{}</div>", svg);
+    body_ += fmt::format("</div><figcaption>{}</figcaption></figure>\n", escaped(caption));
+}
+
 void Page::table(const std::vector<std::string>& columns, const std::vector<Row>& rows) {
     body_ += "<div class=\"wide\"><table>";
     if (!columns.empty()) body_ += "<thead><tr>";
@@ -103,8 +110,8 @@ std::string Page::html() const {
     return fmt::format(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src "
-        "'unsafe-inline'\">\n"
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
+        "style-src 'unsafe-inline'\">\n"
         "<title>{}</title>\n<style>{}</style>\n</head>\n<body>\n<h1>{}</h1>\n{}</body>\n</html>\n",
         title_, kStyle, title_, body_);
 }

@@ -1,5 +1,5 @@
 // One self-contained HTML page: text, tables and inline SVG, styled for screen and paper. No scripts, nothing
-// fetched from elsewhere.
+// fetched from elsewhere; pictures inside an SVG are data URIs (data_uri.hpp).
 #pragma once
 
 #include <string>
@@ -20,6 +20,8 @@ class Page {
     void paragraph(std::string_view text);
     // Already markup: an SVG of svg_chart.hpp.
     void figure(std::string_view svg, std::string_view caption);
+    // Several that stand side by side where there is room.
+    void figures(const std::vector<std::string>& svgs, std::string_view caption);
     // Cells are text. The first column is set left, the others as numbers; `flagged` rows are marked.
     struct Row {
         std::vector<std::string> cells;

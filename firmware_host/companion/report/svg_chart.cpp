@@ -13,12 +13,11 @@ namespace rig::host {
 namespace {
 
 constexpr double kWidthPx = 720.0;
-constexpr double kHeightPx = 300.0;
-constexpr double kLeftPx = 70.0;
 constexpr double kRightPx = 20.0;
 constexpr double kTopPx = 14.0;
 constexpr double kBottomPx = 48.0;
 constexpr double kLegendPx = 14.0;
+constexpr double kEventsPx = 12.0;
 // Text, axes and grid take the page's own colour; these are told from white and from near black.
 constexpr std::array kColours{"#3b82c4", "#d9773f", "#3f9e6b", "#9a6fc4", "#b8952b", "#8a8a8a"};
 constexpr std::string_view kAxis = "stroke=\"currentColor\" stroke-opacity=\"0.7\"";
@@ -94,6 +93,7 @@ void round_out(Axis& axis) {
 // Short, and without the -0 of the arithmetic; a decade that is no plain number as a power.
 std::string tick_text(double tick, bool logarithmic) {
     if (logarithmic && (tick < 0.9e-3 || tick > 1.1e4)) return fmt::format("1e{:.0f}", std::log10(tick));
+    if (std::abs(tick) >= 1e4 && std::abs(tick) < 1e7) return fmt::format("{:.0f}", tick);
     return fmt::format("{:.4g}", tick + 0.0);
 }
 
@@ -105,31 +105,62 @@ Axis empty_axis(bool logarithmic) {
 struct Frame {
     Axis x;
     Axis y;
+    double left_px;
+    double right_px;
+    double bottom_px;
     double top_px = kTopPx;  // the legend is above
-    [[nodiscard]] double x_px(double v) const { return kLeftPx + x.at(v) * (kWidthPx - kLeftPx - kRightPx); }
-    [[nodiscard]] double y_px(double v) const {
-        return kHeightPx - kBottomPx - y.at(v) * (kHeightPx - top_px - kBottomPx);
-    }
+    [[nodiscard]] double x_px(double v) const { return left_px + x.at(v) * (right_px - left_px); }
+    [[nodiscard]] double y_px(double v) const { return bottom_px - y.at(v) * (bottom_px - top_px); }
 };
 
-std::string draw_axes(const Frame& frame, const LineChart& chart) {
+std::string draw_axes(const Frame& frame, const std::string& x_name, const std::string& y_name) {
     std::string out;
-    const double bottom = kHeightPx - kBottomPx;
     for (const double tick : axis_ticks(frame.y.low, frame.y.high, frame.y.logarithmic)) {
-        out += line_between(kLeftPx, frame.y_px(tick), kWidthPx - kRightPx, frame.y_px(tick), kGrid);
-        out += text_at(kLeftPx - 6.0, frame.y_px(tick) + 4.0, "end", tick_text(tick, frame.y.logarithmic));
+        out += line_between(frame.left_px, frame.y_px(tick), frame.right_px, frame.y_px(tick), kGrid);
+        out +=
+            text_at(frame.left_px - 6.0, frame.y_px(tick) + 4.0, "end", tick_text(tick, frame.y.logarithmic));
     }
+    const double bottom = frame.bottom_px;
     for (const double tick : axis_ticks(frame.x.low, frame.x.high, frame.x.logarithmic)) {
         out += line_between(frame.x_px(tick), bottom, frame.x_px(tick), bottom + 4.0, kAxis);
         out += text_at(frame.x_px(tick), bottom + 16.0, "middle", tick_text(tick, frame.x.logarithmic));
     }
-    out += line_between(kLeftPx, bottom, kWidthPx - kRightPx, bottom, kAxis);
-    out += line_between(kLeftPx, frame.top_px, kLeftPx, bottom, kAxis);
-    out += text_at(0.5 * (kLeftPx + kWidthPx - kRightPx), kHeightPx - 14.0, "middle", chart.x_name);
+    out += line_between(frame.left_px, bottom, frame.right_px, bottom, kAxis);
+    out += line_between(frame.left_px, frame.top_px, frame.left_px, bottom, kAxis);
+    out += text_at(0.5 * (frame.left_px + frame.right_px), bottom + 34.0, "middle", x_name);
     out += fmt::format(
-        "<text transform=\"translate(14 {:.1f}) rotate(-90)\" text-anchor=\"middle\" "
+        "<text transform=\"translate({:.1f} {:.1f}) rotate(-90)\" text-anchor=\"middle\" "
         "fill=\"currentColor\">{}</text>\n",
-        0.5 * (frame.top_px + bottom), escaped(chart.y_name));
+        frame.left_px - 56.0, 0.5 * (frame.top_px + bottom), escaped(y_name));
+    return out;
+}
+
+// Names stand inside, above their line, or below it where it is the axis's end.
+std::string draw_levels(const Frame& frame, const LineChart& chart) {
+    std::string out;
+    for (const ChartLevel& level : chart.levels) {
+        const double y = frame.y_px(level.y);
+        out += line_between(frame.left_px, y, frame.right_px, y,
+                            fmt::format("stroke=\"{}\" stroke-dasharray=\"6 3\"", kColours[1]));
+        const double text_y = y - frame.top_px < 14.0 ? y + 13.0 : y - 4.0;
+        out += text_at(frame.right_px - 4.0, text_y, "end", level.name);
+    }
+    return out;
+}
+
+std::string draw_events(const Frame& frame, const LineChart& chart) {
+    std::string out;
+    for (std::size_t e = 0; e < chart.events.size(); ++e) {
+        const char* const colour = kColours[(e + 3) % kColours.size()];
+        std::string path;
+        for (const double x : chart.events[e].x) {
+            if (!std::isfinite(x) || x < frame.x.low || x > frame.x.high) continue;
+            path += fmt::format("M{:.1f} {:.1f}v9", frame.x_px(x), frame.top_px - kEventsPx + 1.0);
+        }
+        if (!path.empty())
+            out += fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>\n", path,
+                               colour);
+    }
     return out;
 }
 
@@ -143,10 +174,14 @@ std::string draw_series(const Frame& frame, const ChartSeries& series, const Pen
                         const LineChart& chart) {
     std::string path;
     std::vector<std::string> marks;
+    bool joined = false;
     for (const ChartPoint& point : series.points) {
-        if (!frame.x.shows(point.x) || !frame.y.shows(point.y)) continue;
-        path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : " L", frame.x_px(point.x),
-                            frame.y_px(point.y));
+        if (!frame.x.shows(point.x) || !frame.y.shows(point.y)) {
+            joined = joined && !chart.gaps;
+            continue;
+        }
+        path += fmt::format("{}{:.1f} {:.1f}", joined ? " L" : "M", frame.x_px(point.x), frame.y_px(point.y));
+        joined = true;
         marks.push_back(fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.2\" fill=\"{}\"/>\n",
                                     frame.x_px(point.x), frame.y_px(point.y), pen.colour));
     }
@@ -168,6 +203,43 @@ double greatest(const std::vector<ChartBar>& bars) {
         }
     }
     return out > 0.0 ? out : 1.0;
+}
+
+void fit_axes(const LineChart& chart, Frame& frame) {
+    for (const ChartSeries& series : chart.series) {
+        for (const ChartPoint& point : series.points) {
+            if (!frame.x.shows(point.x) || !frame.y.shows(point.y)) continue;
+            widen(frame.x, point.x);
+            widen(frame.y, point.y);
+        }
+    }
+    if (chart.marked_x) widen(frame.x, *chart.marked_x);
+    if (chart.x_range) {
+        frame.x.low = (*chart.x_range)[0];
+        frame.x.high = (*chart.x_range)[1];
+    }
+    if (!chart.log_y && chart.from_zero) widen(frame.y, 0.0);
+    for (const ChartLevel& level : chart.levels) widen(frame.y, level.y);
+    settle(frame.x);
+    settle(frame.y);
+    round_out(frame.y);
+}
+
+std::string draw_legend(const LineChart& chart, bool crowd) {
+    std::string out;
+    double at_px = chart.left_px;
+    const auto entry = [&](const std::string& name, const char* colour, double length_px) {
+        out +=
+            line_between(at_px, kTopPx - 2.0, at_px + length_px, kTopPx - 2.0,
+                         fmt::format("stroke=\"{}\" stroke-width=\"{}\"", colour, length_px < 10.0 ? 9 : 2));
+        out += text_at(at_px + length_px + 6.0, kTopPx + 2.0, "start", name);
+        at_px += length_px + 22.0 + 7.0 * static_cast<double>(name.size());
+    };
+    for (std::size_t s = 0; s < chart.series.size() && !crowd && chart.series.size() > 1; ++s)
+        entry(chart.series[s].name, kColours[s], 18.0);
+    for (std::size_t e = 0; e < chart.events.size(); ++e)
+        entry(chart.events[e].name, kColours[(e + 3) % kColours.size()], 2.0);
+    return out;
 }
 
 // From pale blue to red, 0..1: seen on white and on near black.
@@ -206,38 +278,59 @@ std::vector<double> axis_ticks(double low, double high, bool logarithmic) {
 }
 
 std::string line_chart(const LineChart& chart) {
-    Frame frame{empty_axis(chart.log_x), empty_axis(chart.log_y)};
-    for (const ChartSeries& series : chart.series) {
-        for (const ChartPoint& point : series.points) {
-            if (!frame.x.shows(point.x) || !frame.y.shows(point.y)) continue;
-            widen(frame.x, point.x);
-            widen(frame.y, point.y);
-        }
-    }
-    if (chart.marked_x) widen(frame.x, *chart.marked_x);
-    if (!chart.log_y && chart.from_zero) widen(frame.y, 0.0);
-    settle(frame.x);
-    settle(frame.y);
-    round_out(frame.y);
+    Frame frame{.x = empty_axis(chart.log_x),
+                .y = empty_axis(chart.log_y),
+                .left_px = chart.left_px,
+                .right_px = chart.width_px - kRightPx,
+                .bottom_px = chart.height_px - kBottomPx};
+    fit_axes(chart, frame);
     const bool crowd = chart.series.size() > kColours.size();
-    const bool legend = chart.series.size() > 1 && !crowd;
+    const bool legend = (chart.series.size() > 1 && !crowd) || !chart.events.empty();
     if (legend) frame.top_px += kLegendPx;
-    std::string out = open_svg(kWidthPx, kHeightPx, chart.y_name + " against " + chart.x_name);
-    out += draw_axes(frame, chart);
+    if (!chart.events.empty()) frame.top_px += kEventsPx;
+    std::string out = open_svg(chart.width_px, chart.height_px, chart.y_name + " against " + chart.x_name);
+    out += draw_axes(frame, chart.x_name, chart.y_name);
     if (chart.marked_x && frame.x.shows(*chart.marked_x)) {
         out += line_between(frame.x_px(*chart.marked_x), frame.top_px, frame.x_px(*chart.marked_x),
-                            kHeightPx - kBottomPx,
+                            frame.bottom_px,
                             "stroke=\"currentColor\" stroke-opacity=\"0.6\" stroke-dasharray=\"4 3\"");
     }
-    double legend_px = kLeftPx;
+    out += draw_levels(frame, chart);
     for (std::size_t s = 0; s < chart.series.size(); ++s) {
         const Pen pen = crowd ? Pen{kColours[0], 1.0, 0.5} : Pen{kColours[s]};
         out += draw_series(frame, chart.series[s], pen, chart);
-        if (!legend) continue;
-        out += line_between(legend_px, kTopPx - 2.0, legend_px + 18.0, kTopPx - 2.0,
-                            fmt::format("stroke=\"{}\" stroke-width=\"2\"", pen.colour));
-        out += text_at(legend_px + 24.0, kTopPx + 2.0, "start", chart.series[s].name);
-        legend_px += 40.0 + 7.0 * static_cast<double>(chart.series[s].name.size());
+    }
+    out += draw_events(frame, chart);
+    if (legend) out += draw_legend(chart, crowd);
+    return out + "</svg>\n";
+}
+
+std::string column_chart(const ColumnChart& chart) {
+    constexpr double kColumnHeightPx = 220.0;
+    constexpr double kColumnWidthPx = 410.0;
+    constexpr double kColumnLeftPx = 64.0;
+    Frame frame{.x = {chart.low, chart.high},
+                .y = {0.0, 0.0},
+                .left_px = kColumnLeftPx,
+                .right_px = kColumnWidthPx - kRightPx,
+                .bottom_px = kColumnHeightPx - kBottomPx};
+    for (const double value : chart.values) widen(frame.y, value);
+    settle(frame.x);
+    settle(frame.y);
+    round_out(frame.y);
+    std::string out = open_svg(kColumnWidthPx, kColumnHeightPx, chart.y_name + " by " + chart.x_name);
+    out += draw_axes(frame, chart.x_name, chart.y_name);
+    const double step = (chart.high - chart.low) / std::max(1.0, static_cast<double>(chart.values.size()));
+    for (std::size_t i = 0; i < chart.values.size(); ++i) {
+        if (!std::isfinite(chart.values[i]) || chart.values[i] <= 0.0) continue;
+        const double from = chart.low + step * static_cast<double>(i);
+        const double left = frame.x_px(from);
+        const double top = frame.y_px(chart.values[i]);
+        out += fmt::format(
+            "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\"><title>{:.4g} to "
+            "{:.4g}: {:.6g}</title></rect>\n",
+            left + 0.5, top, std::max(0.5, frame.x_px(from + step) - left - 1.0), frame.bottom_px - top,
+            kColours[0], from, from + step, chart.values[i]);
     }
     return out + "</svg>\n";
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -87,6 +88,7 @@ TEST(WritePrintableBoard, CarriesItsResolutionAndIsTheBoard) {
     const auto image = read_grey_image(path);
     ASSERT_TRUE(image.has_value()) << image.error().message;
     EXPECT_EQ(find_board(image->view(), board).points.size(), board_points(board).size());
+    EXPECT_EQ(printed->line_mm, 100.0);
     EXPECT_FALSE(write_printable_board(folder.path() / "no" / "board.png", board).has_value());
     EXPECT_FALSE(write_printable_board(folder.path() / "board.jpg", board).has_value());
 }
@@ -100,6 +102,49 @@ TEST(FindBoard, SaysWhyThereIsNone) {
         std::string::npos);
     const GreyImage larger = draw_board(*parse_board("charuco:12x9:10:7"), 8.0, 5.0);
     EXPECT_NE(find_board(larger.view(), board).fault.find("the board's are 0 to 30"), std::string::npos);
+}
+
+// On a board of less than 100 mm the line is shorter; it and its words stay inside the margin under the
+// board.
+TEST(WritePrintableBoard, HasALineThatThePageHasRoomFor) {
+    const test::TempFolder folder;
+    const std::filesystem::path path = folder.path() / "board.png";
+    const BoardSpec board = *parse_board("circles:4x11:8");
+    const auto printed = write_printable_board(path, board);
+    ASSERT_TRUE(printed.has_value()) << printed.error().message;
+    EXPECT_EQ(printed->line_mm, 50.0);
+    const auto image = read_grey_image(path);
+    ASSERT_TRUE(image.has_value()) << image.error().message;
+    const auto dark = [&](int x, int y) {
+        return image->pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(image->width_px) +
+                             static_cast<std::size_t>(x)] < 128;
+    };
+    const int margin = static_cast<int>(10.0 * printed->px_per_mm);
+    int longest = 0;
+    for (int y = image->height_px - margin; y < image->height_px; ++y) {
+        for (int x = 0, run = 0; x < image->width_px; ++x) {
+            run = dark(x, y) ? run + 1 : 0;
+            longest = std::max(longest, run);
+            if (dark(x, y)) {
+                EXPECT_GE(x, margin - 4);
+                EXPECT_LE(x, image->width_px - margin + 4);
+            }
+        }
+    }
+    EXPECT_NEAR(longest / printed->px_per_mm, 50.0, 0.3);
+    // as a camera would see it: a printed circle is 150 px wide, beyond what detection looks for
+    GreyImage small{image->width_px / 6, image->height_px / 6, {}};
+    for (int y = 0; y < small.height_px; ++y) {
+        for (int x = 0; x < small.width_px; ++x) {
+            int sum = 0;
+            for (int i = 0; i < 36; ++i)
+                sum +=
+                    image
+                        ->pixels[static_cast<std::size_t>((6 * y + i / 6) * image->width_px + 6 * x + i % 6)];
+            small.pixels.push_back(static_cast<std::uint8_t>(sum / 36));
+        }
+    }
+    EXPECT_EQ(find_board(small.view(), board).points.size(), board_points(board).size());
 }
 
 }  // namespace

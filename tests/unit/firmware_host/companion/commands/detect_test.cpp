@@ -113,6 +113,11 @@ TEST_F(DetectVerb, OverlaysAreWrittenOnePerImage) {
     EXPECT_EQ(drawn->width_px, 960);
     EXPECT_EQ(run({a.string(), "--overlay", (folder.path() / "no" / "such" / "out.png").string()}).exit_code,
               host::kExitOutput);
+    const std::string dots = (folder.path() / "dots").string();
+    EXPECT_EQ(run({a.string(), b.string(), "--overlay", dots}).exit_code, host::kExitUsage);
+    EXPECT_EQ(run({a.string(), b.string(), "--overlay", dots + "/"}).exit_code, host::kExitOk);
+    EXPECT_TRUE(fs::exists(folder.path() / "dots" / "a.png"));
+    EXPECT_TRUE(fs::exists(folder.path() / "dots" / "b.png"));
 }
 
 }  // namespace

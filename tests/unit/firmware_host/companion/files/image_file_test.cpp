@@ -125,5 +125,20 @@ TEST(ImageFile, RgbKeepsItsChannelOrder) {
     EXPECT_FALSE(write_rgb_image(folder / "d.png", 2, 1, {255, 0, 0}));
 }
 
+TEST(ImageFile, PicturesForPagesDecodeToWhatWasEncoded) {
+    const std::vector<std::uint8_t> png = encode_rgba_png(2, 1, {255, 0, 0, 255, 1, 2, 3, 0});
+    const cv::Mat bgra = cv::imdecode(png, cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(bgra.channels(), 4);
+    EXPECT_EQ(bgra.at<cv::Vec4b>(0, 0), cv::Vec4b(0, 0, 255, 255));
+    EXPECT_EQ(bgra.at<cv::Vec4b>(0, 1)[3], 0);
+    const GreyImage image = gradient(64, 48);
+    const std::vector<std::uint8_t> jpeg = encode_jpeg(image, 90);
+    const auto back = parse_grey_image(std::as_bytes(std::span(jpeg)), "back.jpg");
+    ASSERT_TRUE(back);
+    ASSERT_EQ(back->pixels.size(), image.pixels.size());
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+        ASSERT_NEAR(back->pixels[i], image.pixels[i], 16) << i;
+}
+
 }  // namespace
 }  // namespace rig::host

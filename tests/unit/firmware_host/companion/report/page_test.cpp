@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "firmware_host/companion/report/data_uri.hpp"
+
 namespace rig::host {
 namespace {
 
@@ -30,6 +32,22 @@ TEST(Page, IsOneDocumentWithoutAnythingFromElsewhere) {
     EXPECT_NE(html.find("<tr class=\"flagged\"><td>&lt;b&gt;</td>"), std::string::npos);
     EXPECT_NE(html.find("<figcaption>caption &quot;q&quot;</figcaption>"), std::string::npos);
     EXPECT_EQ(html, page.html());
+}
+
+TEST(Page, AllowsPicturesOfItsOwnOnly) {
+    Page page("p");
+    page.figures({"<svg>1</svg>", "<svg>2</svg>"}, "two & more");
+    const std::string html = page.html();
+    EXPECT_NE(html.find("default-src 'none'; img-src data:; style-src"), std::string::npos);
+    EXPECT_NE(html.find("<div><svg>1</svg></div><div><svg>2</svg></div>"), std::string::npos);
+    EXPECT_NE(html.find("<figcaption>two &amp; more</figcaption>"), std::string::npos);
+}
+
+TEST(DataUri, IsBase64WithPadding) {
+    const std::vector<std::uint8_t> bytes{'r', 'i', 'g', 's'};
+    EXPECT_EQ(data_uri("image/png", bytes), "data:image/png;base64,cmlncw==");
+    EXPECT_EQ(data_uri("image/png", std::span(bytes).first(3)), "data:image/png;base64,cmln");
+    EXPECT_EQ(data_uri("image/jpeg", {}), "data:image/jpeg;base64,");
 }
 
 }  // namespace

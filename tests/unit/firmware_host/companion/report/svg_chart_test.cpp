@@ -78,6 +78,43 @@ TEST(LineChart, SurvivesEmptyAndFlatCurves) {
     }
 }
 
+TEST(LineChart, ShowsThresholdsEventsAndGaps) {
+    LineChart chart{.x_name = "time, s", .y_name = "mm", .dots = false, .series = {{"a", {}}}};
+    chart.series[0].points = {{0.0, 1.0}, {1.0, 2.0}, {2.0, kNan}, {3.0, 1.0}, {4.0, 2.0}};
+    const auto runs = [](const std::string& svg) {
+        const std::size_t start = svg.find("<path d=\"");
+        return count_of(svg.substr(start, svg.find("fill=", start) - start), "M");
+    };
+    EXPECT_EQ(runs(line_chart(chart)), 1U);
+    chart.gaps = true;
+    EXPECT_EQ(runs(line_chart(chart)), 2U);
+    chart.levels = {{"alarm <8>", 8.0}};
+    chart.events = {{"happened", {0.5, 3.5, 99.0, kNan}}};
+    chart.x_range = {{0.0, 20.0}};
+    const std::string svg = line_chart(chart);
+    expect_whole(svg);
+    EXPECT_NE(svg.find("alarm &lt;8&gt;"), std::string::npos);
+    EXPECT_NE(svg.find(">8<"), std::string::npos);   // the threshold is inside the axis
+    EXPECT_NE(svg.find(">20<"), std::string::npos);  // and so is the whole range
+    EXPECT_NE(svg.find(">happened<"), std::string::npos);
+    EXPECT_EQ(count_of(svg, "v9"), 2U);  // what is outside is left out
+}
+
+TEST(LineChart, LargeNumbersStayPlain) {
+    LineChart chart{.x_name = "x", .y_name = "y", .series = {{"a", {{0.0, 0.0}, {1.0, 60000.0}}}}};
+    EXPECT_NE(line_chart(chart).find(">60000<"), std::string::npos);
+}
+
+TEST(ColumnChart, HasAColumnForEveryValueAboveZero) {
+    const std::string svg = column_chart(
+        {.x_name = "<px>", .y_name = "blobs", .low = 0.0, .high = 4.0, .values = {3.0, 0.0, kNan, 6.0}});
+    expect_whole(svg);
+    EXPECT_EQ(count_of(svg, "<rect"), 2U);
+    EXPECT_NE(svg.find("3 to 4: 6"), std::string::npos);
+    EXPECT_NE(svg.find("&lt;px&gt;"), std::string::npos);
+    expect_whole(column_chart({}));
+}
+
 TEST(BarChart, ScalesToTheLargestAndEscapes) {
     const std::string svg = bar_chart(
         {{"</text><script>", 2.0, 4.0, true}, {"b", 1.0, {}, false}, {"zero", 0.0, {}, false}}, "mm");
