@@ -85,6 +85,8 @@ Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const O
             break;
         }
         if (next->reset_before) pipeline->reset_tracking();
+        if (next->neutral_forgotten_before) pipeline->forget_neutral();
+        if (next->neutral_before) pipeline->begin_neutral();
         if (next->new_controls != nullptr && !pipeline->set_controls(*next->new_controls)) {
             return failure(FileError{request.log.string() + ": sets controls of shapes that " +
                                      request.pack_name + " does not have"});
