@@ -10,7 +10,9 @@
 #include "core/detect/observation.hpp"
 #include "core/filter/smoothing.hpp"
 #include "core/geometry/mount_drift.hpp"
+#include "core/geometry/pnp.hpp"
 #include "core/image/view.hpp"
+#include "core/stabilise/neutral_capture.hpp"
 
 namespace rig {
 
@@ -18,7 +20,10 @@ enum class LossPolicy : std::uint8_t { kHold = 0, kDecay = 1 };
 
 struct PipelineConfig {
     bool stabilise = true;  // false: input is already in the face frame
-    bool filter = true;     // smoothing and recovery blends; a temporal prior in the pack stays on either way
+    // false: the cameras stand beside the performer. What they see move as a whole is the head, not the
+    // helmet: FrameReport::head_pose tells it, no slip is put out and none raises an alarm.
+    bool camera_on_head = true;
+    bool filter = true;  // smoothing and recovery blends; a temporal prior in the pack stays on either way
     FilterChoice smoothing;  // per shape, when `filter` is set
     bool windows = true;  // look for a tracked face's markers where they should be, not in the whole picture
     LossPolicy loss_policy = LossPolicy::kHold;
@@ -80,6 +85,9 @@ struct FrameReport {
         labels{};  // PointFrame input: the marker each point was taken for, -1 none
     // how each camera sits on the helmet, by the pack's reference marks; nothing measured without them
     std::array<MountDriftReport, kMaxCameras> mounts{};
+    // where the head is, by the pixels of its named markers; only when the cameras are not on it
+    HeadPose head_pose;
+    NeutralReport neutral;  // of a neutral that is being taken
     // stabilised, completed markers in the face frame, mm; [marker_count]
     std::array<Vec3, kMaxMarkers> face_markers_mm{};
     // 1 measured .. 0 unknown, and the expected distance from the truth of those inferred;

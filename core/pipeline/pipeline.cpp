@@ -18,6 +18,15 @@ constexpr std::int64_t kDecayUs = 400'000;  // to the rest pose, policy kDecay
 constexpr float kObservable = 0.5F;    // confidence, everything visible, from which a shape counts as seen
 constexpr float kPartialShare = 0.5F;  // of that confidence, under which its region is not seen any more
 
+// Of a head before cameras that stand: where it is about, and how far it goes in a frame.
+constexpr double kHeadSigmaRad = 0.8;
+constexpr double kHeadSigmaMm = 200.0;
+constexpr double kHeadStepRad = 0.02;
+constexpr double kHeadStepMm = 3.0;
+constexpr double kHeadSigmaPx = 0.3;  // of a named pixel about the fitted face
+constexpr double kNeutralS = 1.0;     // of a face at rest that becomes the neutral ...
+constexpr int kNeutralPatience = 3;   // ... within so many times as long
+
 bool usable_status(CameraStatus status) {
     return status == CameraStatus::kGood || status == CameraStatus::kExposure;
 }
@@ -80,8 +89,19 @@ void Pipeline::configure_stages(const PipelineConfig& config) {
     mounts_.fill(MountDriftState{});
     tracker_config_ = TrackerConfig{};
     tracker_config_.rate_hz = config.rate_hz;
+    reset_neutral(neutral_);
+    neutral_config_ = NeutralConfig{};
+    neutral_config_.frames = static_cast<std::uint16_t>(std::max(1.0, config.rate_hz * kNeutralS));
+    neutral_config_.most_ticks = static_cast<std::uint16_t>(kNeutralPatience * neutral_config_.frames);
     stabiliser_config_ = StabiliserConfig{};
     stabiliser_config_.enabled = config.stabilise;
+    if (!config.camera_on_head) {
+        // A head turns further than a helmet slips, and it never creeps.
+        stabiliser_config_.rotation_sigma_rad = kHeadSigmaRad;
+        stabiliser_config_.translation_sigma_mm = kHeadSigmaMm;
+        stabiliser_config_.step_rotation_sigma_rad = kHeadStepRad;
+        stabiliser_config_.step_translation_sigma_mm = kHeadStepMm;
+    }
     configure_smoothing(config.smoothing, config.rate_hz, pack_.weight_low, pack_.weight_high,
                         smoothing_config_);
     recovery_config_ = RecoveryConfig{};
@@ -100,11 +120,20 @@ Result<void, ControlError> Pipeline::set_controls(const ControlSet& controls) {
     return {};
 }
 
+void Pipeline::begin_neutral() {
+    if (configured_) rig::begin_neutral(neutral_);
+}
+
+void Pipeline::forget_neutral() {
+    reset_neutral(neutral_);
+}
+
 void Pipeline::reset_tracking() {
     reset_tracker(tracker_);
     reset_stabiliser(stabiliser_);
     reset_solver(solver_);
     reset_smoothing(smoothing_);
+    head_pose_ = HeadPose{};
 }
 
 // After a loss nothing of before helps any more. A search for identities that is under way goes on.
@@ -261,9 +290,37 @@ void Pipeline::idle(std::int64_t now_us, FaceState& state, FrameReport& report) 
     finish(now_us, false, state, report);
 }
 
+// The expression is the stabiliser's; where the head is, the pixels say themselves.
+void Pipeline::find_head_pose(FrameReport& report) {
+    named_pixels_.clear();
+    for (std::size_t c = 0; c < sightings_.view_count; ++c) {
+        for (std::size_t k = 0; k < pack_.marker_count; ++k) {
+            const std::int16_t at = track_report_.matches[c][k];
+            if (at < 0 || !named_.markers[k].seen) continue;
+            const Observation& seen = observations_[c][static_cast<std::size_t>(at)];
+            const Vec3 face_mm =
+                model_.face_position(k, stabilised_.fit.coefficients) + neutral_.offset_mm[k];
+            const bool kept = named_pixels_.push_back(
+                {&pack_.cameras[c], face_mm,
+                 Vec2{static_cast<double>(seen.x_px), static_cast<double>(seen.y_px)}});
+            RIG_CHECK(kept);
+        }
+    }
+    PnpConfig config;
+    // What the shapes leave of the face counts as well as the detector's error.
+    config.sigma_px = kHeadSigmaPx;
+    report.head_pose = solve_pnp(named_pixels_.span(), config, head_pose_);
+    head_pose_ = report.head_pose;
+}
+
 void Pipeline::solve_named(std::int64_t capture_us, FrameReport& report) {
-    stabilise(model_, stabiliser_config_, named_, stabiliser_, stabiliser_workspace_, stabilised_,
-              stabiliser_report_);
+    if (neutral_.any) {
+        centred_ = named_;
+        subtract_offsets(neutral_, config_.stabilise ? tracker_.fit.pose : Rigid{}, centred_);
+    }
+    stabilise(model_, stabiliser_config_, neutral_.any ? centred_ : named_, stabiliser_,
+              stabiliser_workspace_, stabilised_, stabiliser_report_);
+    if (!config_.camera_on_head && sightings_.from_cameras) find_head_pose(report);
     infer_missing(face_gaussian_, stabilised_, inference_workspace_, completed_);
     solve(solver_config_, stabilised_, completed_, capture_us, solver_, solver_workspace_, solved_,
           solver_report_);
@@ -305,6 +362,8 @@ void Pipeline::finish(std::int64_t capture_us, bool usable, FaceState& state, Fr
     step_ladder(ladder_config_, input, ladder_);
     state.state = ladder_.state;
     if (configured_) {
+        watch_neutral(model_, pack_.neutral_mm, static_cast<double>(pack_.noise_mm), neutral_config_,
+                      usable ? &stabilised_ : nullptr, neutral_, report.neutral);
         if (!usable && ladder_.state == TrackingState::kLost) forget();
         put_out(capture_us, usable, state, report);
     }
@@ -339,7 +398,7 @@ void Pipeline::put_out(std::int64_t capture_us, bool usable, FaceState& state, F
         if (sent_any_) state.capture_us = sent_us_;  // of the weights, which may be older than this frame
         last_usable_us_ = capture_us;
         lost_from_ = sent_;
-        write_slip(stabilised_.headset_from_face, state.slip);
+        if (config_.camera_on_head) write_slip(stabilised_.headset_from_face, state.slip);
     } else {
         hold(capture_us, state);
     }
@@ -354,7 +413,7 @@ void Pipeline::put_out(std::int64_t capture_us, bool usable, FaceState& state, F
 void Pipeline::hold(std::int64_t capture_us, FaceState& state) {
     state.held = true;
     if (sent_any_) state.capture_us = sent_us_;
-    write_slip(stabilised_.headset_from_face, state.slip);
+    if (config_.camera_on_head) write_slip(stabilised_.headset_from_face, state.slip);
     if (ladder_.state <= TrackingState::kHold) reset_recovery(recovery_);
     if (!ladder_.ever_usable || ladder_.state != TrackingState::kLost) return;
     if (config_.loss_policy != LossPolicy::kDecay) return;
@@ -382,8 +441,8 @@ void Pipeline::raise_faults(bool usable, const FrameReport& report, FaceState& s
     raise(state.state == TrackingState::kPartial, Fault::kMarkersMissing);
     raise(report.swaps_repaired > 0 || report.names_rejected > 0, Fault::kMarkerSwap);
     raise(!report.optimal, Fault::kSolveWeak);
-    raise(stabiliser_report_.slip_rotation_rad > kSlipAlarmRad ||
-              stabiliser_report_.slip_translation_mm > kSlipAlarmMm,
+    raise(config_.camera_on_head && (stabiliser_report_.slip_rotation_rad > kSlipAlarmRad ||
+                                     stabiliser_report_.slip_translation_mm > kSlipAlarmMm),
           Fault::kRigMoved);
 }
 

@@ -15,6 +15,7 @@
 #include "core/pipeline/frame_types.hpp"
 #include "core/pipeline/ladder.hpp"
 #include "core/solve/solver.hpp"
+#include "core/stabilise/neutral_capture.hpp"
 #include "core/stabilise/stabiliser.hpp"
 #include "core/track/helmet_marks.hpp"
 #include "core/track/tracker.hpp"
@@ -53,6 +54,12 @@ class Pipeline {
     // Forgets identities, slip and the temporal prior; the next frames find them anew.
     void reset_tracking();
 
+    // "Basis": the next second of the face at rest becomes the neutral, as an offset of each marker; the
+    // report's `neutral` tells how it goes and why it is refused. Nothing before configure(), after which
+    // there are no offsets. reset_tracking() keeps them.
+    void begin_neutral();
+    void forget_neutral();
+
     // Of the last step, for recording and pictures.
     [[nodiscard]] const Observations& observations(std::size_t camera) const { return observations_[camera]; }
     [[nodiscard]] const NamedMarkers& named_markers() const { return named_; }
@@ -73,6 +80,7 @@ class Pipeline {
     void take_observations(std::size_t camera, std::span<const Observation> observations,
                            FrameReport& report);
     void track_sightings(FrameReport& report);
+    void find_head_pose(FrameReport& report);
     void solve_named(std::int64_t capture_us, FrameReport& report);
     void finish(std::int64_t capture_us, bool usable, FaceState& state, FrameReport& report);
     void put_out(std::int64_t capture_us, bool usable, FaceState& state, FrameReport& report);
@@ -101,6 +109,13 @@ class Pipeline {
     TrackerWorkspace tracker_workspace_;
     TrackerReport track_report_;
     NamedMarkers named_;
+
+    BoundedVector<NamedPixel, kMaxPnpPoints> named_pixels_;
+    HeadPose head_pose_;  // of the last frame that had one
+
+    NeutralConfig neutral_config_;
+    NeutralState neutral_;
+    NamedMarkers centred_;  // named_ with the offsets of the neutral taken off
 
     StabiliserConfig stabiliser_config_;
     StabiliserState stabiliser_;

@@ -301,7 +301,7 @@ Result<StopStreams, WireError> decode_stop_streams(ByteSpan payload) {
 namespace {
 
 bool in_range(const CommandMessage& command) {
-    return command.command == BoardCommand::kResetTracking || command.command == BoardCommand::kNeutral;
+    return command.command >= BoardCommand::kResetTracking && command.command <= BoardCommand::kForgetNeutral;
 }
 
 }  // namespace

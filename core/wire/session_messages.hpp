@@ -117,6 +117,7 @@ struct StopStreams {
 enum class BoardCommand : std::uint8_t {
     kResetTracking = 1,  // forget identities and slip, as the board's button does
     kNeutral = 2,        // take the present face for the neutral one
+    kForgetNeutral = 3,  // go back to the pack's own
 };
 struct CommandMessage {
     BoardCommand command = BoardCommand::kResetTracking;

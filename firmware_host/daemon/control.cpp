@@ -154,9 +154,11 @@ void Control::handle_status(const FrameView& frame) {
 void Control::handle_command(const FrameView& frame) {
     const auto command = decode_command(frame.payload);
     if (!command) return refuse(frame, nak_reason(command.error()));
-    // Neutral is part of the pack: taking another one needs a pack, not a command.
-    if (command->command != BoardCommand::kResetTracking) return refuse(frame, NakReason::kNotNow);
-    solver_.request_reset();
+    const bool resets = command->command == BoardCommand::kResetTracking;
+    if (!resets && identity_.shape_names.empty()) return refuse(frame, NakReason::kNotNow);
+    if (resets) solver_.request_reset();
+    if (command->command == BoardCommand::kNeutral) solver_.request_neutral();
+    if (command->command == BoardCommand::kForgetNeutral) solver_.request_forget_neutral();
     acknowledge(frame);
 }
 

@@ -57,6 +57,7 @@ void LinkPort::offer(const TickOutput& output) {
     waiting_due_ = due;
     is_waiting_ = true;
     tell_faults();
+    tell_neutral();
 }
 
 bool LinkPort::reply(MessageType type, ByteSpan payload) {
@@ -233,6 +234,17 @@ void LinkPort::tell_faults() {
         if (streams_.mask == 0 || replies_.size() >= kReplies / 2 || !events_.take(wall_.now_us())) continue;
         static_cast<void>(reply(MessageType::kEvent, event));
     }
+}
+
+// An answer to a command: told whether or not anybody streams.
+void LinkPort::tell_neutral() {
+    if (waiting_.neutrals_ended == neutrals_told_) return;
+    EventMessage event;
+    event.time_us = clock_.now_us();
+    event.kind = EventKind::kLog;
+    event.level = waiting_.neutral_taken ? EventLevel::kInfo : EventLevel::kWarning;
+    event.text = waiting_.neutral_text;
+    if (reply(MessageType::kEvent, event)) neutrals_told_ = waiting_.neutrals_ended;
 }
 
 Health LinkPort::health(const Health& of_solver) const {

@@ -94,6 +94,7 @@ class LinkPort {
     void reopen_when_due();
     void watch_stall(bool took);
     void tell_faults();
+    void tell_neutral();
 
     ByteLink& link_;
     const Clock& clock_;
@@ -132,6 +133,7 @@ class LinkPort {
     FaultMap link_faults_ = 0;
     FaultBook link_book_;
     FaultBook told_;  // what events have said
+    std::uint32_t neutrals_told_ = 0;
     TokenBucket events_{10, 20};
     FrameCounters received_;
     TimeBook latencies_;

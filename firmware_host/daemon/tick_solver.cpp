@@ -1,5 +1,7 @@
 #include "firmware_host/daemon/tick_solver.hpp"
 
+#include "firmware_host/daemon/neutral_text.hpp"
+
 namespace rig {
 
 TickSolver::TickSolver(const TickSolverParts& parts) : parts_(parts) {
@@ -7,17 +9,12 @@ TickSolver::TickSolver(const TickSolverParts& parts) : parts_(parts) {
 }
 
 void TickSolver::tick(const FrameSet& frames, FaultMap faults, TickOutput& output) {
-    const bool reset = reset_wanted_.exchange(false, std::memory_order_relaxed);
-    if (reset) parts_.pipeline.reset_tracking();
-    const ControlSet* const controls = wanted_controls_.take();
-    if (controls != nullptr) {
-        const auto set = parts_.pipeline.set_controls(*controls);
-        RIG_CHECK(set.has_value());
-    }
+    const Wishes wishes = carry_out_wishes();
     const std::int64_t began_us = parts_.wall.now_us();
     parts_.pipeline.step(frames, state_, report_);
     const std::int64_t solve_us = parts_.wall.now_us() - began_us;
-    record(frames, reset, controls);
+    record(frames, wishes);
+    note_neutral();
     static_cast<void>(gate_.pass(state_));
     digest_.add(state_);
     state_.faults |= faults;
@@ -26,6 +23,35 @@ void TickSolver::tick(const FrameSet& frames, FaultMap faults, TickOutput& outpu
     output.state = state_;
     output.markers = marker_frame(parts_.pipeline.named_markers(), state_.sequence);
     output.health = health_;
+    output.neutrals_ended = neutrals_ended_;
+    output.neutral_taken = neutral_taken_;
+    output.neutral_text = neutral_text_;
+}
+
+TickSolver::Wishes TickSolver::carry_out_wishes() {
+    Wishes wishes;
+    wishes.reset = reset_wanted_.exchange(false, std::memory_order_relaxed);
+    wishes.neutral = neutral_wanted_.exchange(false, std::memory_order_relaxed);
+    wishes.forget_neutral = forget_neutral_wanted_.exchange(false, std::memory_order_relaxed);
+    wishes.controls = wanted_controls_.take();
+    if (wishes.reset) parts_.pipeline.reset_tracking();
+    if (wishes.forget_neutral) parts_.pipeline.forget_neutral();
+    if (wishes.neutral) parts_.pipeline.begin_neutral();
+    if (wishes.controls != nullptr) {
+        const auto set = parts_.pipeline.set_controls(*wishes.controls);
+        RIG_CHECK(set.has_value());
+    }
+    return wishes;
+}
+
+void TickSolver::note_neutral() {
+    const NeutralReport& neutral = report_.neutral;
+    if (neutral.phase != NeutralPhase::kTaken && neutral.phase != NeutralPhase::kRefused) return;
+    ++neutrals_ended_;
+    neutral_taken_ = neutral.phase == NeutralPhase::kTaken;
+    const bool known = parts_.pack != nullptr && neutral.marker < parts_.pack->marker_count;
+    const std::string_view name = known ? parts_.pack->marker_names[neutral.marker] : std::string_view{};
+    neutral_text_ = neutral_text(neutral, name.empty() ? "a marker" : name);
 }
 
 void TickSolver::request_controls(const ControlSet& controls) {
@@ -33,13 +59,15 @@ void TickSolver::request_controls(const ControlSet& controls) {
     static_cast<void>(wanted_controls_.publish());  // the newest set is the whole truth
 }
 
-void TickSolver::record(const FrameSet& frames, bool reset_before, const ControlSet* new_controls) {
+void TickSolver::record(const FrameSet& frames, const Wishes& wishes) {
     if (parts_.log == nullptr) return;
     ObservationTick tick;
     tick.number = state_.sequence;
     tick.capture_us = frames.capture_us;
-    tick.reset_before = reset_before;
-    tick.new_controls = new_controls;
+    tick.reset_before = wishes.reset;
+    tick.neutral_before = wishes.neutral;
+    tick.neutral_forgotten_before = wishes.forget_neutral;
+    tick.new_controls = wishes.controls;
     tick.status = state_.cameras;
     for (std::size_t c = 0; c < kMaxCameras; ++c) tick.cameras[c] = parts_.pipeline.observations(c).span();
     parts_.log->append(tick);

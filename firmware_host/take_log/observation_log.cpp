@@ -16,6 +16,8 @@ constexpr std::uint8_t kFilterBit = 1;
 constexpr std::uint8_t kStabiliseBit = 2;
 constexpr std::uint8_t kResetBit = 1;
 constexpr std::uint8_t kControlsBit = 2;
+constexpr std::uint8_t kNeutralBit = 4;
+constexpr std::uint8_t kForgetNeutralBit = 8;
 constexpr std::uint8_t kLastStatus = static_cast<std::uint8_t>(CameraStatus::kExposure);
 
 // How one shape is smoothed, in a byte.
@@ -69,8 +71,9 @@ std::size_t write_record(const ObservationTick& tick, std::uint8_t camera_count,
     writer.write(std::uint32_t{0});
     writer.write(tick.number);
     writer.write(tick.capture_us);
-    writer.write(static_cast<std::uint8_t>((tick.reset_before ? kResetBit : 0) |
-                                           (tick.new_controls != nullptr ? kControlsBit : 0)));
+    writer.write(static_cast<std::uint8_t>(
+        (tick.reset_before ? kResetBit : 0) | (tick.new_controls != nullptr ? kControlsBit : 0) |
+        (tick.neutral_before ? kNeutralBit : 0) | (tick.neutral_forgotten_before ? kForgetNeutralBit : 0)));
     for (std::size_t c = 0; c < kMaxCameras; ++c) {
         writer.write(c < camera_count ? tick.status[c] : CameraStatus::kUnused);
     }
@@ -242,7 +245,10 @@ Result<ObservationTick, ObservationLogError> ObservationLogReader::next() {
     const auto statuses = reader.read<std::array<std::uint8_t, kMaxCameras>>();
     const auto padding = reader.read<std::array<std::uint8_t, 3>>();
     tick.reset_before = (flags & kResetBit) != 0;
-    bool sound = flags <= (kResetBit | kControlsBit) && padding == std::array<std::uint8_t, 3>{};
+    tick.neutral_before = (flags & kNeutralBit) != 0;
+    tick.neutral_forgotten_before = (flags & kForgetNeutralBit) != 0;
+    bool sound = flags <= (kResetBit | kControlsBit | kNeutralBit | kForgetNeutralBit) &&
+                 padding == std::array<std::uint8_t, 3>{};
     for (std::size_t c = 0; c < kMaxCameras; ++c) {
         sound = sound && statuses[c] <= kLastStatus;
         tick.status[c] = static_cast<CameraStatus>(sound ? statuses[c] : 0);

@@ -15,7 +15,8 @@
 //   0  4  u32 length of the record in bytes, this field included
 //   4  4  u32 tick number, +1 each; a gap is a tick that the recorder had to drop
 //   8  8  i64 capture time of the tick, us
-//  16  1  u8 bit 0: tracking was reset just before this tick; bit 1: so were controls set; others 0
+//  16  1  u8 bit 0: tracking was reset just before this tick; bit 1: so were controls set; bit 2:
+//         a neutral was begun to be taken; bit 3: the neutral was forgotten; others 0
 //  17  4  u8 status of each camera, 0 for cameras beyond the count
 //  21  3  zero
 //  24     per camera: u16 count, then count times 5 x f32 (x_px, y_px, diameter_px, contrast, score)
@@ -68,6 +69,8 @@ struct ObservationTick {
     std::uint32_t number = 0;
     std::int64_t capture_us = 0;
     bool reset_before = false;
+    bool neutral_before = false;  // a neutral is taken from this tick on
+    bool neutral_forgotten_before = false;
     const ControlSet* new_controls = nullptr;  // from this tick on; nullptr: as before
     std::array<CameraStatus, kMaxCameras> status{};
     std::array<std::span<const Observation>, kMaxCameras> cameras{};

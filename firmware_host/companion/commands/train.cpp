@@ -369,7 +369,8 @@ void add_train_verb(CLI::App& app, int& exit_code) {
                      "performances to learn from (CSV); rbf, keyshapes and examples need one")
         ->type_name("CSV...");
     verb->add_option("--cameras", command->cameras,
-                     "cameras.json of the helmet; without it the pack solves marker streams only")
+                     "cameras.json of the helmet, its reference marks too; without it the pack solves marker "
+                     "streams only")
         ->type_name("JSON");
     CLI::Option* noise = add_noise_options(*verb, *command);
     verb->add_option("--rate", command->options.rate_hz, "frame rate it is for")

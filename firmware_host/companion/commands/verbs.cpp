@@ -23,6 +23,7 @@ void add_all_verbs(CLI::App& app, int& exit_code) {
     add_inspect_verb(app, exit_code);
     add_status_verb(app, exit_code);
     add_control_verb(app, exit_code);
+    add_neutral_verb(app, exit_code);
     add_info_verb(app, exit_code);
     add_experiment_verb(app, exit_code);
 }

@@ -18,6 +18,7 @@ inline constexpr int kExitInterrupted = 130;
 // alphabetical order.
 void add_calibrate_verb(CLI::App& app, int& exit_code);
 void add_control_verb(CLI::App& app, int& exit_code);
+void add_neutral_verb(CLI::App& app, int& exit_code);
 void add_demo_verb(CLI::App& app, int& exit_code);
 void add_detect_verb(CLI::App& app, int& exit_code);
 void add_experiment_verb(CLI::App& app, int& exit_code);

@@ -188,6 +188,7 @@ void HostSession::take_ack(ByteSpan payload) {
         controls_.pop_front();
         control_asked_us_.reset();
     }
+    if (type == MessageType::kCommand && ack->sequence == command_sequence_) command_answered_ = true;
     if (phase_ == SessionPhase::kClaiming && type == MessageType::kHello) {
         refusal_.clear();
         enter(SessionPhase::kNaming);
@@ -207,6 +208,10 @@ void HostSession::take_nak(ByteSpan payload) {
     if (type == MessageType::kControl && !controls_.empty() && nak->sequence == control_sequence_) {
         control_refusal_ = nak->reason;
         controls_.clear();
+    }
+    if (type == MessageType::kCommand && nak->sequence == command_sequence_) {
+        command_answered_ = true;
+        command_refusal_ = nak->reason;
     }
     if (type != MessageType::kHello && type != MessageType::kStartStreams) return;
     switch (nak->reason) {
@@ -318,6 +323,7 @@ void HostSession::ask(std::int64_t now_us) {
     ask_time(now_us);
     ask_control(now_us);
     if (command_ && phase_ == SessionPhase::kReady) {
+        command_sequence_ = sequence_;
         send(MessageType::kCommand, CommandMessage{*command_});
         command_.reset();
     }

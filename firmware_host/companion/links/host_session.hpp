@@ -82,7 +82,14 @@ class HostSession {
     // Asks for one status message; repeated until it has come.
     void request_status() { status_wanted_ = true; }
     // Sent at the next poll(), once: commands are not repeated, since a second neutral is not the first.
-    void command(BoardCommand command) { command_ = command; }
+    void command(BoardCommand command) {
+        command_ = command;
+        command_answered_ = false;
+        command_refusal_.reset();
+    }
+    // The board has said yes or no to the last command.
+    [[nodiscard]] bool command_answered() const { return command_answered_; }
+    [[nodiscard]] const std::optional<NakReason>& command_refusal() const { return command_refusal_; }
     // Sent in their order, each repeated until the board has accepted it: controls are absolute.
     void control(const ControlMessage& message) { controls_.push_back(message); }
     [[nodiscard]] std::size_t controls_waiting() const { return controls_.size(); }
@@ -160,6 +167,9 @@ class HostSession {
     bool status_wanted_ = false;
     std::optional<std::int64_t> status_asked_us_;
     std::optional<BoardCommand> command_;
+    std::uint32_t command_sequence_ = 0;  // of the frame that carried it
+    bool command_answered_ = false;
+    std::optional<NakReason> command_refusal_;
     std::deque<ControlMessage> controls_;
     std::optional<std::int64_t> control_asked_us_;
     std::uint32_t control_sequence_ = 0;  // of the frame that carried the first of them last

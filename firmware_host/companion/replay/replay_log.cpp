@@ -87,6 +87,8 @@ Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const O
             break;
         }
         if (next->reset_before) pipeline->reset_tracking();
+        if (next->neutral_forgotten_before) pipeline->forget_neutral();
+        if (next->neutral_before) pipeline->begin_neutral();
         result.controls = result.controls || next->new_controls != nullptr;
         const bool control = next->new_controls != nullptr && !request.as_solved;
         if (control && !pipeline->set_controls(*next->new_controls)) {

@@ -5,6 +5,7 @@
 
 #include "core/geometry/camera_model.hpp"
 #include "core/geometry/mount_drift.hpp"
+#include "core/geometry/pnp.hpp"
 #include "core/geometry/triangulation.hpp"
 #include "tests/support/random.hpp"
 
@@ -62,6 +63,12 @@ void add_geometry(test::Digest& digest) {
             digest.add(fit.rms_px);
             marks.push_back({point, sightings[0].pixel, true});
         }
+        std::vector<NamedPixel> named;
+        for (const ReferenceMark& mark : marks) named.push_back({&cameras[0], mark.headset_mm, mark.seen_px});
+        const HeadPose pose = solve_pnp(named, {.sigma_px = 0.2});
+        add(digest, pose.reference_from_face.translation_mm);
+        for (int k = 0; k < 9; ++k) digest.add(pose.reference_from_face.rotation(k / 3, k % 3));
+        add(digest, pose.rotation_sigma_rad);
         for (int frame = 0; frame < 3; ++frame) watch_mount(cameras[0], {}, marks, state, report);
         add(digest, report.turn_rad);
         digest.add(report.shift_px);

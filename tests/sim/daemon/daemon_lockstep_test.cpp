@@ -311,11 +311,77 @@ TEST(DaemonLockstep, ResetComesFromTheHostToo) {
     DaemonBench bench;
     bench.before_tick = [](DaemonBench& b, std::uint32_t tick) {
         if (tick == 30) b.host.send(MessageType::kCommand, CommandMessage{BoardCommand::kResetTracking});
-        if (tick == 35) b.host.send(MessageType::kCommand, CommandMessage{BoardCommand::kNeutral});
     };
     static_cast<void>(bench.run());
     EXPECT_EQ(bench.app().health().bootstraps, 2U);
     EXPECT_EQ(bench.host.count(MessageType::kAck), 1U);
+}
+
+std::vector<std::string> log_lines(const TestHost& host) {
+    std::vector<std::string> lines;
+    for (const auto& [head, payload] : host.frames) {
+        if (head.type != MessageType::kEvent) continue;
+        const auto event = decode_event(payload);
+        if (event && event->kind == EventKind::kLog) lines.emplace_back(event->text.view());
+    }
+    return lines;
+}
+
+TEST(DaemonLockstep, ANeutralIsRefusedWhileTheFaceTalksAndTheReasonIsTold) {
+    BenchOptions options;
+    options.frames = 100;
+    DaemonBench bench(options);
+    bench.before_tick = [](DaemonBench& b, std::uint32_t tick) {
+        if (tick == 20) b.host.send(MessageType::kCommand, CommandMessage{BoardCommand::kNeutral});
+    };
+    static_cast<void>(bench.run());
+    EXPECT_EQ(bench.host.count(MessageType::kAck), 1U);
+    const auto lines = log_lines(bench.host);
+    ASSERT_EQ(lines.size(), 1U);
+    EXPECT_TRUE(lines[0].starts_with("neutral refused: the face moved, a marker by ")) << lines[0];
+    // Nothing has changed.
+    DaemonBench plain(options);
+    static_cast<void>(plain.run());
+    EXPECT_EQ(bench.app().digest().value(), plain.app().digest().value());
+}
+
+TEST(DaemonLockstep, ANeutralOfAFaceAtRestIsTakenAndForgotten) {
+    PaintedTakeOptions still;
+    still.at_rest = true;
+    still.aside_mm = 0.8;
+    const PaintedTake take(still);
+    BenchOptions options;
+    options.frames = 160;
+    options.take = &take;
+    DaemonBench bench(options);
+    bench.before_tick = [](DaemonBench& b, std::uint32_t tick) {
+        if (tick == 20) b.host.send(MessageType::kCommand, CommandMessage{BoardCommand::kNeutral});
+        if (tick == 120) b.host.send(MessageType::kCommand, CommandMessage{BoardCommand::kForgetNeutral});
+    };
+    static_cast<void>(bench.run());
+    EXPECT_EQ(bench.host.count(MessageType::kAck), 2U);
+    const auto lines = log_lines(bench.host);
+    ASSERT_EQ(lines.size(), 1U);
+    EXPECT_TRUE(lines[0].starts_with("neutral taken: offsets of 0.")) << lines[0];
+    const auto largest = [&](std::size_t tick) {
+        float most = 0.0F;
+        for (const float w : bench.host.states[tick].weights) most = std::max(most, w);
+        return most;
+    };
+    std::printf("largest weight at rest, dots glued 0.8 mm aside: %.3f before, %.3f after the neutral\n",
+                static_cast<double>(largest(60)), static_cast<double>(largest(110)));
+    EXPECT_LT(largest(110), 0.25F * largest(60));
+    EXPECT_NEAR(static_cast<double>(largest(155)), static_cast<double>(largest(60)), 0.1);
+}
+
+TEST(DaemonLockstep, WithoutAPackThereIsNoNeutralToTake) {
+    BenchOptions options;
+    options.with_pack = false;
+    DaemonBench bench(options);
+    bench.before_tick = [](DaemonBench& b, std::uint32_t tick) {
+        if (tick == 5) b.host.send(MessageType::kCommand, CommandMessage{BoardCommand::kNeutral});
+    };
+    static_cast<void>(bench.run());
     EXPECT_EQ(decode_nak(*bench.host.last(MessageType::kNak))->reason, NakReason::kNotNow);
 }
 
@@ -469,6 +535,8 @@ TEST(DaemonLockstep, TheObservationLogRepeatsTheRun) {
         const auto tick = log.next();
         ASSERT_TRUE(tick.has_value());
         if (tick->reset_before) pipeline->reset_tracking();
+        if (tick->neutral_forgotten_before) pipeline->forget_neutral();
+        if (tick->neutral_before) pipeline->begin_neutral();
         if (tick->new_controls != nullptr) {
             ASSERT_TRUE(pipeline->set_controls(*tick->new_controls).has_value());
             ++control_changes;

@@ -56,8 +56,12 @@ void PaintedTake::paint(std::size_t camera, std::uint32_t frame, std::span<std::
     const bool knocked = camera == options_.knocked_camera && frame >= options_.knocked_from;
     const CameraModel model =
         knocked ? turned_camera(pack_.cameras[camera], options_.knock_rad) : pack_.cameras[camera];
-    const auto weights = face_.weights_at(frame / kTakeRate_hz);
-    const auto positions = face_.positions(weights);
+    auto positions = face_.positions(weights_at(frame));
+    for (std::size_t k = 0; k < positions.size(); ++k) {
+        SeededRandom way(k + 1);
+        const Vec3 aside{way.normal(0.0, 1.0), way.normal(0.0, 1.0), way.normal(0.0, 1.0)};
+        positions[k] += options_.aside_mm * aside.normalized();
+    }
     const auto paint_dot = [&](const Vec3& position) {
         const ReferencePixel at = reference_project(model, position);
         const double radius = kDotRadius_mm * model.fx_px / static_cast<double>(at.z_mm);

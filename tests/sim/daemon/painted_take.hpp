@@ -19,6 +19,8 @@ struct PaintedTakeOptions {
     std::size_t knocked_camera = 0;
     std::uint32_t knocked_from = 0;  // first frame in which it is turned
     Vec3 knock_rad = Vec3::Zero();   // camera axes
+    bool at_rest = false;            // the face does nothing
+    double aside_mm = 0.0;           // how far every dot is glued aside, its own way
 };
 
 class PaintedTake {
@@ -34,7 +36,8 @@ class PaintedTake {
         };
     }
     [[nodiscard]] std::vector<double> weights_at(std::uint32_t frame) const {
-        return face_.weights_at(frame / kTakeRate_hz);
+        return options_.at_rest ? std::vector<double>(face_.shape_count(), 0.0)
+                                : face_.weights_at(frame / kTakeRate_hz);
     }
     [[nodiscard]] int width_px() const { return pack_.cameras[0].width_px; }
     [[nodiscard]] int height_px() const { return pack_.cameras[0].height_px; }

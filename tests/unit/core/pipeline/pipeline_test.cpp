@@ -11,67 +11,15 @@
 #include "core/base/math.hpp"
 #include "tests/support/digest.hpp"
 #include "tests/support/synthetic_face.hpp"
+#include "tests/unit/core/pipeline/pipeline_scene.hpp"
 
 namespace rig {
 namespace {
 
-constexpr std::int64_t kFrameUs = 16'667;
+using test::kFrameUs;
 const Vec3 kNowhere{std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0};
 
-struct Scene {
-    explicit Scene(const PipelineConfig& config = {}, const test::SyntheticFaceOptions& options = {})
-        : face(options) {
-        EXPECT_TRUE(pipeline->configure(face.pack(), config).has_value());
-    }
-
-    std::vector<Vec3> seen_at(int at) {
-        const double time_s = at / 60.0;
-        std::vector<Vec3> points =
-            test::moved(test::creeping_slip(time_s), face.positions(face.weights_at(time_s)));
-        test::add_noise(points, 0.1, random);
-        return points;
-    }
-    // One labelled frame of the performance, or a tick with nothing.
-    void labelled() {
-        const std::vector<Vec3> points = seen_at(frame);
-        pipeline->step(LabelledFrame{now(), points}, state, report);
-        after();
-    }
-    void idle() {
-        pipeline->idle(now(), state, report);
-        after();
-    }
-    [[nodiscard]] std::int64_t now() const { return 1'000'000 + frame * kFrameUs; }
-    [[nodiscard]] double weight_rms() const {
-        const std::vector<double> truth = face.weights_at((frame - 1) / 60.0);
-        double sum = 0.0;
-        for (std::size_t i = 0; i < truth.size(); ++i) {
-            const double e = static_cast<double>(state.weights[i]) - truth[i];
-            sum += e * e;
-        }
-        return std::sqrt(sum / static_cast<double>(truth.size()));
-    }
-    // Largest change of a weight since the tick before.
-    double step_size = 0.0;
-
-    test::SyntheticFace face;
-    std::unique_ptr<Pipeline> pipeline = std::make_unique<Pipeline>();
-    FaceState state;
-    FrameReport report;
-    int frame = 0;
-    test::SeededRandom random{161};
-
-  private:
-    void after() {
-        ++frame;
-        step_size = 0.0;
-        for (std::size_t i = 0; i < face.shape_count(); ++i) {
-            step_size = std::max(step_size, std::fabs(static_cast<double>(state.weights[i] - before_[i])));
-        }
-        before_ = state.weights;
-    }
-    std::array<float, kMaxShapes> before_{};
-};
+using Scene = test::PipelineScene;
 
 void expect_contract(const FaceState& state, const FrameReport& report, std::size_t shapes,
                      std::size_t markers) {
@@ -386,87 +334,6 @@ TEST(Pipeline, ACameraThatIsGoneMakesItPartial) {
     EXPECT_EQ(states[33], TrackingState::kPartial);
     for (const int i : {20, 25, 29, 33})
         EXPECT_EQ(states[static_cast<std::size_t>(i)], TrackingState::kPartial);
-}
-
-// A frame of both cameras as they sit, helmet marks among the dots.
-void step_with_marks(Scene& s, std::span<const HelmetMark> marks, const Vec3& turn_rad) {
-    const std::vector<Vec3> truth = s.face.positions(s.face.weights_at(s.frame / 60.0));
-    std::array<std::vector<Observation>, 2> views;
-    ObservationFrame frame;
-    frame.capture_us = s.now();
-    frame.camera_count = 2;
-    for (std::size_t c = 0; c < 2; ++c) {
-        const CameraModel camera = s.face.pack().cameras[c];
-        const CameraModel sits = c == 1 ? turned_camera(camera, turn_rad) : camera;
-        const auto add = [&](const Vec3& at) {
-            const test::ReferencePixel p = test::reference_project(sits, at);
-            views[c].push_back({static_cast<float>(static_cast<double>(p.x_px) + s.random.normal(0.0, 0.1)),
-                                static_cast<float>(static_cast<double>(p.y_px) + s.random.normal(0.0, 0.1)),
-                                8.0F, 0.5F, 0.9F});
-        };
-        for (const HelmetMark& mark : marks) add(mark.headset_mm);
-        for (const Vec3& at : truth) add(at);
-        frame.status[c] = CameraStatus::kGood;
-        frame.cameras[c] = views[c];
-    }
-    s.pipeline->step(frame, s.state, s.report);
-    ++s.frame;
-}
-
-TEST(Pipeline, AKnockedCameraIsReportedAndItsMarksAreNoMarkersOfTheFace) {
-    test::SyntheticFaceOptions options;
-    options.camera_count = 2;
-    Scene s({}, options);
-    SolvePack pack = s.face.pack();
-    for (const double x : {-70.0, 0.0, 70.0})
-        pack.reference_marks[pack.reference_mark_count++] = {Vec3{x, 66.0, 12.0}, 3};
-    ASSERT_TRUE(s.pipeline->configure(pack, {}).has_value());
-    const std::span<const HelmetMark> marks = std::span(pack.reference_marks).first(3);
-    const Vec3 turn{0.012, -0.009, 0.005};
-    int raised = -1;
-    for (int i = 0; i < 200; ++i) {
-        step_with_marks(s, marks, i < 60 ? Vec3{Vec3::Zero()} : turn);
-        const bool fault = (s.state.faults & fault_bit(Fault::kRigMoved)) != 0;
-        if (fault && raised < 0) raised = i;
-        EXPECT_TRUE(s.report.mounts[0].measured && s.report.mounts[1].measured) << i;
-        EXPECT_EQ(s.report.mounts[1].drifted, fault);
-        EXPECT_FALSE(s.report.mounts[0].drifted);
-        EXPECT_EQ(s.report.observations[0], 63) << "what was seen is told as it was seen";
-        for (std::size_t c = 0; c < 2; ++c) {
-            for (std::size_t k = 0; k < 60; ++k) {
-                const int at = s.pipeline->matches()[c][k];
-                // Observation 3 + k is marker k.
-                if (at >= 0) {
-                    ASSERT_EQ(at, static_cast<int>(k) + 3) << i;
-                }
-            }
-        }
-    }
-    EXPECT_GE(raised, 89);
-    EXPECT_LE(raised, 120);
-    EXPECT_LT((s.report.mounts[1].turn_rad - turn).norm(), 1e-3);
-    EXPECT_LT(s.weight_rms(), 0.05);
-    s.idle();
-    EXPECT_NE(s.state.faults & fault_bit(Fault::kRigMoved), 0U) << "a tick without pictures mends no bracket";
-    ASSERT_TRUE(s.pipeline->configure(pack, {}).has_value());
-    s.idle();
-    EXPECT_EQ(s.state.faults & fault_bit(Fault::kRigMoved), 0U);
-}
-
-TEST(Pipeline, ARigWithoutMarksSolvesToTheSameBitsAsOneWhoseMarksNobodySees) {
-    test::SyntheticFaceOptions options;
-    options.camera_count = 2;
-    Scene plain({}, options);
-    Scene marked({}, options);
-    SolvePack pack = marked.face.pack();
-    pack.reference_marks[pack.reference_mark_count++] = {Vec3{300.0, 200.0, 100.0}, 3};
-    ASSERT_TRUE(marked.pipeline->configure(pack, {}).has_value());
-    for (int i = 0; i < 40; ++i) {
-        step_with_marks(plain, {}, Vec3::Zero());
-        step_with_marks(marked, {}, Vec3::Zero());
-        ASSERT_EQ(plain.state.weights, marked.state.weights) << i;
-        EXPECT_FALSE(plain.report.mounts[0].measured);
-    }
 }
 
 // Dark discs on grey skin where the projection puts them.

@@ -145,6 +145,7 @@ TEST(SessionMessages, RangesAreChecked) {
     EXPECT_EQ(encode(StartStreams{1, 1, 1, 0}, buffer).error(), WireError::kRange);
     EXPECT_EQ(encode(StopStreams{0}, buffer).error(), WireError::kRange);
     EXPECT_EQ(encode(CommandMessage{static_cast<BoardCommand>(0)}, buffer).error(), WireError::kRange);
+    EXPECT_EQ(encode(CommandMessage{static_cast<BoardCommand>(4)}, buffer).error(), WireError::kRange);
     EXPECT_EQ(encode(NakMessage{static_cast<NakReason>(8), 0, 0}, buffer).error(), WireError::kRange);
     EXPECT_EQ(encode(GoodbyeMessage{static_cast<GoodbyeReason>(4)}, buffer).error(), WireError::kRange);
     EXPECT_EQ(encode(NamesRequest{static_cast<NameKind>(2), 0}, buffer).error(), WireError::kRange);

@@ -62,6 +62,8 @@ class ObservationLogTest : public testing::Test {
             tick.number = static_cast<std::uint32_t>(i);
             tick.capture_us = 1'000'000 + 16'667 * i;
             tick.reset_before = i == 7;
+            tick.neutral_before = i == 3;
+            tick.neutral_forgotten_before = i == 3 || i == 9;
             if (i % 5 == 2) tick.new_controls = &controls_;
             tick.status = {CameraStatus::kGood, CameraStatus::kExposure, CameraStatus::kGone,
                            CameraStatus::kGone};
@@ -94,6 +96,8 @@ TEST_F(ObservationLogTest, WhatIsWrittenIsRead) {
         EXPECT_EQ(tick->number, i);
         EXPECT_EQ(tick->capture_us, 1'000'000 + 16'667 * i);
         EXPECT_EQ(tick->reset_before, i == 7);
+        EXPECT_EQ(tick->neutral_before, i == 3);
+        EXPECT_EQ(tick->neutral_forgotten_before, i == 3 || i == 9);
         ASSERT_EQ(tick->new_controls != nullptr, i % 5 == 2);
         if (tick->new_controls != nullptr) {
             EXPECT_EQ(tick->new_controls->shapes, controls_.shapes);

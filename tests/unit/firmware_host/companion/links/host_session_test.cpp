@@ -233,8 +233,20 @@ TEST(HostSession, CommandsGoOnce) {
     Bench bench;
     bench.run(1.0);
     bench.session.command(BoardCommand::kResetTracking);
+    EXPECT_FALSE(bench.session.command_answered());
     bench.run(2.0);
     EXPECT_EQ(bench.board.commands(), 1U);
+    EXPECT_TRUE(bench.session.command_answered());
+    EXPECT_FALSE(bench.session.command_refusal().has_value());
+}
+
+TEST(HostSession, ARefusedCommandSaysWhy) {
+    Bench bench({.busy = true}, {.streams = 0});
+    bench.run(1.0);
+    bench.session.command(BoardCommand::kNeutral);
+    bench.run(1.0);
+    EXPECT_TRUE(bench.session.command_answered());
+    EXPECT_EQ(bench.session.command_refusal(), NakReason::kBusy);
 }
 
 TEST(HostSession, LeavingStopsTheStreams) {
