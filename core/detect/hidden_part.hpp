@@ -15,7 +15,7 @@ namespace rig {
 
 // Moments of the whole marker from those of its seen part: hidden pixels take the weight that the ellipse of
 // equal moments gives them, until the two agree. Leaves `seen` as it is when more than two fifths of that
-// ellipse are hidden. Both are in pixels of the window; hidden reaches no farther than its height.
+// ellipse would be hidden. Both are in pixels of the window; hidden reaches no farther than its height.
 [[nodiscard]] SoftMoments complete_moments(const SoftMoments& seen, const BitRows& hidden, int height);
 
 }  // namespace rig

@@ -137,6 +137,17 @@ bool parse_command_line(int argc, char** argv, CommandLine& into, int& exit_code
                "When the face is lost: hold, or decay to rest");
     add_choice(app, "--polarity", polarities, into.pipeline.polarity,
                "What the markers are: auto, dark or bright");
+    app.add_flag("--auto-exposure", into.auto_exposure,
+                 "Set exposure and gain of the cameras by the light at the markers");
+    app.add_option("--max-exposure-us", into.most_exposure_us,
+                   "Longest exposure that motion blur allows, microseconds; gain beyond")
+        ->check(CLI::Range(100.0, 33000.0).description(""))
+        ->capture_default_str()
+        ->type_name("US");
+    app.add_option("--mains", into.mains_hz, "Lamps flicker with the mains: 50 or 60 Hz; 0: they do not")
+        ->check(CLI::IsMember({0, 50, 60}).description(""))
+        ->capture_default_str()
+        ->type_name("HZ");
     app.add_option("--log-observations", into.log_observations,
                    "Record what detection sees, for headrig replay")
         ->type_name("FILE");

@@ -166,25 +166,30 @@ double skin_level(const DiscSceneConfig& config) {
     return config.bright ? kRetroSkin : kInkSkin;
 }
 
-DiscPicture render(const DiscSceneConfig& config) {
+DiscLight light_of(const DiscSceneConfig& config) {
     SeededRandom random(config.seed);
     const Head head(config, random);
     FineField fine(config.width_px, config.height_px);
     paint_skin(head, fine);
-    DiscPicture result;
+    std::vector<DiscTruth> discs;
     std::int16_t index = 0;
     for (const Disc& disc : place_discs(config, head, random)) {
-        result.discs.push_back(paint_disc(config, head, disc, index++, fine));
+        discs.push_back(paint_disc(config, head, disc, index++, fine));
     }
-    const Film film = disturb(config, result.discs, fine, random);
-    fine.note_hidden(result.discs);
-    LightField field = fine.pixels();
-    add_texture(field, config.texture, random);
-    smear(field, film.motion_px, film.motion_rad);
-    for (double& value : field.values) value *= film.exposure;
-    blur(field, config.blur_px);
-    result.picture = digitise(field, config.read_noise, config.shot_noise, random);
+    const Film film = disturb(config, discs, fine, random);
+    fine.note_hidden(discs);
+    DiscLight result{fine.pixels(), std::move(discs)};
+    add_texture(result.light, config.texture, random);
+    smear(result.light, film.motion_px, film.motion_rad);
+    for (double& value : result.light.values) value *= film.exposure;
+    blur(result.light, config.blur_px);
     return result;
+}
+
+DiscPicture render(const DiscSceneConfig& config) {
+    DiscLight lit = light_of(config);
+    SeededRandom random(config.seed ^ 0x5EED);
+    return {digitise(lit.light, config.read_noise, config.shot_noise, random), std::move(lit.discs)};
 }
 
 std::vector<TrueDot> true_dots(const DiscPicture& picture) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/support/dot_scene/dot_scene.hpp"
+#include "tests/support/dot_scene/light_field.hpp"
 #include "tests/support/dot_scene/match.hpp"
 
 namespace rig::test {
@@ -56,6 +57,11 @@ struct DiscTruth {
     double hidden = 0.0;       // part of its area under something that is not shade
 };
 
+struct DiscLight {
+    LightField light;  // on the sensor at nominal exposure, behind the lens
+    std::vector<DiscTruth> discs;
+};
+
 struct DiscPicture {
     Picture picture;
     std::vector<DiscTruth> discs;
@@ -67,6 +73,7 @@ inline constexpr double kMostExpectedHidden = 0.34;  // a third of the area, and
 // Grey level of skin that faces the light.
 [[nodiscard]] double skin_level(const DiscSceneConfig& config);
 
+[[nodiscard]] DiscLight light_of(const DiscSceneConfig& config);
 [[nodiscard]] DiscPicture render(const DiscSceneConfig& config);
 
 // Expected: seen at a cosine above 0.35, at most a third of it hidden. Reach: half the long axis.
