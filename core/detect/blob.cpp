@@ -425,7 +425,8 @@ double outline_deviation_px(const BlobWorkspace& w, const SoftMoments& m, double
             const auto end = static_cast<int>(std::clamp(middle + half, -1.0, 63.0) + 1.0);
             if (begin < end) ellipse = bit_span(begin, end);
         }
-        wrong += ones((ellipse ^ w.blob[static_cast<std::size_t>(y)]) & ~w.hidden[static_cast<std::size_t>(y)]);
+        wrong +=
+            ones((ellipse ^ w.blob[static_cast<std::size_t>(y)]) & ~w.hidden[static_cast<std::size_t>(y)]);
     }
     return wrong / (6.283185307179586 * mean_radius_px);
 }

@@ -64,7 +64,7 @@ struct DetectorReport {
     double brightest_level = 0.0;    // brighter side of a marker: a tenth of the markers are brighter
     double faintest_contrast = 0.0;  // a tenth of the markers have less
     std::uint8_t exposure = 0;       // ExposureFlag bits
-    FaultMap faults = 0;        // kExposure, kBlobCapacity
+    FaultMap faults = 0;             // kExposure, kBlobCapacity
 };
 
 // Of the background at the scale of the largest marker.

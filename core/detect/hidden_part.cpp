@@ -12,8 +12,8 @@ namespace {
 constexpr double kFull = 256.0;      // cover of a pixel that is all blob
 constexpr double kLeastCover = 0.4;  // beyond the skin's level, in units of the contrast,
 constexpr double kLeastNoise = 4.0;  // and of the skin's own deviation
-constexpr int kRounds = 12;           // halve what is left, or better, up to three quarters of the way hidden
-constexpr double kStride = 2.0;       // of each; the plain step (1) falls short by the hidden part of the rim
+constexpr int kRounds = 12;          // halve what is left, or better, up to three quarters of the way hidden
+constexpr double kStride = 2.0;      // of each; the plain step (1) falls short by the hidden part of the rim
 constexpr double kMostHidden = 0.4;  // of the ellipse
 
 // Sums of weight, x, y, xx, xy, yy.
@@ -97,9 +97,8 @@ SoftMoments complete_moments(const SoftMoments& seen, const BitRows& hidden, int
     for (int round = 0; round < kRounds; ++round) {
         const Sums more = hidden_sums(whole, hidden, height);
         if (more.w > kMostHidden * (known.w + more.w)) return seen;
-        const SoftMoments next =
-            moments_of({known.w + more.w, known.x + more.x, known.y + more.y, known.xx + more.xx,
-                        known.xy + more.xy, known.yy + more.yy});
+        const SoftMoments next = moments_of({known.w + more.w, known.x + more.x, known.y + more.y,
+                                             known.xx + more.xx, known.xy + more.xy, known.yy + more.yy});
         whole = step_towards(whole, next, round + 1 < kRounds ? kStride : 1.0);
         if (!(whole.xx > 0.0 && whole.xx * whole.yy > whole.xy * whole.xy)) return seen;
     }

@@ -23,11 +23,11 @@ constexpr int kCoarse = 16;      // fixed point of a distance from the backgroun
 constexpr int kFine = 32;        // and of an outline
 constexpr int kReach = 1;        // px that the outline may lie outside the start
 constexpr double kFullWeight = 255.0;
-constexpr double kSure = 0.8;       // badness of a marker above which it is measured again, slowly
+constexpr double kSure = 0.8;        // badness of a marker above which it is measured again, slowly
 constexpr double kBeyondSkin = 0.4;  // of the contrast, by which a pixel that is neither paint nor skin shows
-constexpr double kSteepest = 0.8;   // change of the light from the window's centre to its corner
-constexpr double kSpread = 0.2;     // of the contrast, that the skin around may stray from its plane
-constexpr double kCleanRim = 0.97;  // of the rim is skin: nothing reaches the blob from outside
+constexpr double kSteepest = 0.8;    // change of the light from the window's centre to its corner
+constexpr double kSpread = 0.2;      // of the contrast, that the skin around may stray from its plane
+constexpr double kCleanRim = 0.97;   // of the rim is skin: nothing reaches the blob from outside
 
 // Over the pixels that count: x and y from the window's centre, t = grey level - guess.
 struct RimSums {
@@ -184,10 +184,10 @@ class QuickMeasure {
     int centre_y_;
     int guess_ = 0;  // grey level of the skin around
     Plane plane_;
-    double rms_ = 0.0;    // of the skin about the plane
-    double clean_ = 0.0;  // part of the rim that is skin
+    double rms_ = 0.0;     // of the skin about the plane
+    double clean_ = 0.0;   // part of the rim that is skin
     bool hidden_ = false;  // something that is neither paint nor skin lies on the blob
-    int first_ = 0;       // rows of the blob: [first_, last_]
+    int first_ = 0;        // rows of the blob: [first_, last_]
     int last_ = 0;
 };
 

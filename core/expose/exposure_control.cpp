@@ -8,10 +8,10 @@ namespace rig {
 
 namespace {
 
-constexpr double kSaturatedLevel = 248.0;   // grey levels: noise keeps it below 255
-constexpr double kFloodedFraction = 0.25;   // of the picture, without markers to go by
-constexpr double kBlindBand = 1.6;          // the picture's mean says less than the markers
-constexpr double kLeastSignal = 1.0;        // grey levels over black, for ratios
+constexpr double kSaturatedLevel = 248.0;          // grey levels: noise keeps it below 255
+constexpr double kFloodedFraction = 0.25;          // of the picture, without markers to go by
+constexpr double kBlindBand = 1.6;                 // the picture's mean says less than the markers
+constexpr double kLeastSignal = 1.0;               // grey levels over black, for ratios
 constexpr double kDbPerNeper = 8.685889638065037;  // 20 / ln 10
 
 bool in_range(double value, double low, double high) {

@@ -24,17 +24,20 @@ struct ExposureConfig {
     double shortest_us = 20.0;  // what the camera can
     double longest_us = 16000.0;
     double most_gain_db = 24.0;  // 0 dB is the least
-    double blur_limit_us = 4000.0;  // longest exposure that motion allows: 0.25 m/s moves 1 mm, 3 px; gain beyond
-    double mains_hz = 0.0;  // 50 or 60 where lamps flicker: exposures are multiples of half its period if long
-                            // enough; 0 for lamps that do not
-    double target_level = 165.0;  // of the brightest tenth of the markers: 50 % more light is no saturation yet
-    double black_level = 2.0;     // of the sensor, at no light
-    double band = 1.25;           // light off by less than this factor either way is left alone
-    double largest_step = 2.0;    // factor of one change, either way
-    double least_contrast = 20.0;      // grey levels, below which markers are called faint
-    std::uint16_t least_markers = 4;   // below: the picture's own brightness leads
-    std::uint8_t settle_frames = 3;    // from a change until it is seen: two frames of latency, and one to spare
-    std::uint8_t window_frames = 3;    // that agree before a change: a flash is no light
+    double blur_limit_us =
+        4000.0;             // longest exposure that motion allows: 0.25 m/s moves 1 mm, 3 px; gain beyond
+    double mains_hz = 0.0;  // 50 or 60 where lamps flicker: exposures are multiples of half its period if
+                            // long enough; 0 for lamps that do not
+    double target_level =
+        165.0;                  // of the brightest tenth of the markers: 50 % more light is no saturation yet
+    double black_level = 2.0;   // of the sensor, at no light
+    double band = 1.25;         // light off by less than this factor either way is left alone
+    double largest_step = 2.0;  // factor of one change, either way
+    double least_contrast = 20.0;     // grey levels, below which markers are called faint
+    std::uint16_t least_markers = 4;  // below: the picture's own brightness leads
+    std::uint8_t settle_frames =
+        3;  // from a change until it is seen: two frames of latency, and one to spare
+    std::uint8_t window_frames = 3;     // that agree before a change: a flash is no light
     double start_exposure_us = 2000.0;  // where it begins; shared out anew between the two
     double start_gain_db = 0.0;
 };
@@ -52,9 +55,9 @@ enum class ExposureTrouble : std::uint8_t {
 struct ExposureProposal {
     std::int32_t exposure_us = 0;
     float gain_db = 0.0F;
-    bool changed = false;       // to be set on the camera; true on the first frame
-    std::uint8_t trouble = 0;   // ExposureTrouble bits
-    FaultMap faults = 0;        // kExposure when too dark or too bright
+    bool changed = false;      // to be set on the camera; true on the first frame
+    std::uint8_t trouble = 0;  // ExposureTrouble bits
+    FaultMap faults = 0;       // kExposure when too dark or too bright
 };
 
 // One camera. Deterministic: a function of the readings since configure(). Every proposal is finite and in
@@ -70,7 +73,7 @@ class ExposureControl {
   private:
     struct Window {
         int frames = 0;
-        int sighted = 0;  // frames with enough markers
+        int sighted = 0;     // frames with enough markers
         double level = 0.0;  // sums
         double contrast = 0.0;
         double luma = 0.0;
@@ -90,7 +93,7 @@ class ExposureControl {
     double longest_us_ = 4000.0;  // camera and blur limit
     double most_gain_ = 15.848931924611133;
     double exposure_us_ = 2000.0;
-    double gain_ = 1.0;  // amplitude ratio
+    double gain_ = 1.0;         // amplitude ratio
     double usual_luma_ = 60.0;  // of the picture when the markers are right; a guess before that
     Window window_;
     int wait_ = 0;

@@ -99,8 +99,7 @@ ExposureConfig exposure_config(const CommandLine& command_line, double rate_hz) 
     ExposureConfig config;
     config.blur_limit_us = command_line.most_exposure_us;
     config.longest_us = std::max(0.9e6 / rate_hz, config.shortest_us);
-    config.start_exposure_us =
-        std::min({config.start_exposure_us, config.blur_limit_us, config.longest_us});
+    config.start_exposure_us = std::min({config.start_exposure_us, config.blur_limit_us, config.longest_us});
     config.mains_hz = command_line.mains_hz;
     return config;
 }

@@ -1,6 +1,7 @@
 #include "tests/support/dot_scene/disc_scene.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -12,12 +13,12 @@ namespace rig::test {
 
 namespace {
 
-constexpr double kInkPaint = 0.2;       // reflectance relative to skin
-constexpr double kInkSkin = 160.0;      // grey level of skin that faces the light
-constexpr double kRetroSkin = 45.0;     // retro-reflective discs are exposed for themselves
-constexpr double kBehind = 6.0;         // grey level of what is behind the head
+constexpr double kInkPaint = 0.2;    // reflectance relative to skin
+constexpr double kInkSkin = 160.0;   // grey level of skin that faces the light
+constexpr double kRetroSkin = 45.0;  // retro-reflective discs are exposed for themselves
+constexpr double kBehind = 6.0;      // grey level of what is behind the head
 constexpr double kGoldenAngle = 2.399963229728653;
-constexpr int kDiscsOnSphere = 270;     // over the whole sphere; a fifth of them faces the camera
+constexpr int kDiscsOnSphere = 270;  // over the whole sphere; a fifth of them faces the camera
 
 struct Vector {
     double x = 0.0, y = 0.0, z = 0.0;
@@ -60,9 +61,7 @@ class Head {
         const double r = c_.head_radius_mm;
         return {r * normal.x, r * normal.y, r * normal.z + depth_};
     }
-    [[nodiscard]] double cosine_at(const Vector& normal) const {
-        return -dot(normal, unit(point(normal)));
-    }
+    [[nodiscard]] double cosine_at(const Vector& normal) const { return -dot(normal, unit(point(normal))); }
     [[nodiscard]] double x_px(const Vector& p) const {
         return c_.focal_px * p.x / p.z + 0.5 * (c_.width_px - 1);
     }
@@ -109,7 +108,12 @@ std::vector<Disc> place_discs(const DiscSceneConfig& config, const Head& head, S
 DiscTruth paint_disc(const DiscSceneConfig& config, const Head& head, const Disc& disc, std::int16_t index,
                      FineField& fine) {
     const Vector centre = head.point(disc.normal);
-    DiscTruth truth{head.x_px(centre), head.y_px(centre), 0.0, 0.0, 0.0, head.cosine_at(disc.normal), 0.0};
+    DiscTruth truth;
+    truth.x_px = head.x_px(centre);
+    truth.y_px = head.y_px(centre);
+    truth.cosine = head.cosine_at(disc.normal);
+    std::copy_n(std::array{centre.x, centre.y, centre.z}.begin(), 3, truth.centre_mm);
+    std::copy_n(std::array{disc.normal.x, disc.normal.y, disc.normal.z}.begin(), 3, truth.normal);
     const double reach_px = 0.6 * config.disc_mm * config.focal_px / centre.z + 1.0;
     // A point is on the disc when its way along the skin to the centre is at most half a diameter.
     const double least_dot = std::cos(0.5 * config.disc_mm / config.head_radius_mm);

@@ -14,17 +14,17 @@ namespace rig::test {
 
 enum class Disturbance : std::uint8_t {
     kNone,
-    kGlintsOnDiscs,   // specular spots, a tenth to a quarter of a disc wide, on two discs of five
-    kGlintsOnSkin,    // the same beside the discs, and small bright spots anywhere
-    kStreaks,         // wet, saturated lines, some across discs
-    kHighlights,      // saturated areas several discs wide, their borders across discs
-    kNostrils,        // dark holes of one to three discs' length with a soft edge
-    kLashes,          // fans of dark strokes under a pixel wide on a lid line, some across discs
-    kLipShadow,       // a dark line with a soft shadow below it, both across discs
-    kMotion,          // 1 to 4 px of straight motion during the exposure
-    kOverexposed,     // skin facing the light is saturated
-    kUnderexposed,    // a quarter of the light, the noise stays
-    kEverything,      // all of the above but the last two
+    kGlintsOnDiscs,  // specular spots, a tenth to a quarter of a disc wide, on two discs of five
+    kGlintsOnSkin,   // the same beside the discs, and small bright spots anywhere
+    kStreaks,        // wet, saturated lines, some across discs
+    kHighlights,     // saturated areas several discs wide, their borders across discs
+    kNostrils,       // dark holes of one to three discs' length with a soft edge
+    kLashes,         // fans of dark strokes under a pixel wide on a lid line, some across discs
+    kLipShadow,      // a dark line with a soft shadow below it, both across discs
+    kMotion,         // 1 to 4 px of straight motion during the exposure
+    kOverexposed,    // skin facing the light is saturated
+    kUnderexposed,   // a quarter of the light, the noise stays
+    kEverything,     // all of the above but the last two
     kCount
 };
 
@@ -38,7 +38,7 @@ struct DiscSceneConfig {
     double focal_px = 500.0;
     double disc_mm = 3.0;        // diameter, along the skin
     double least_cosine = 0.25;  // of the viewing angle, at which discs end
-    bool bright = false;         // retro-reflective discs and light from the lens; else ink and light from a side
+    bool bright = false;  // retro-reflective discs and light from the lens; else ink and light from a side
     double blur_px = 0.8;
     double texture = 0.0;  // relative standard deviation of the skin's mottling
     double read_noise = 1.5;
@@ -54,7 +54,9 @@ struct DiscTruth {
     double centroid_y_px = 0.0;
     double diameter_px = 0.0;  // of the disc of equal area
     double cosine = 0.0;       // of the viewing angle
-    double hidden = 0.0;       // part of its area under something that is not shade
+    double centre_mm[3] = {};  // camera axes: x right, y down, z forward
+    double normal[3] = {};
+    double hidden = 0.0;  // part of its area under something that is not shade
 };
 
 struct DiscLight {

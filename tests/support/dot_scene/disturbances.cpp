@@ -10,7 +10,7 @@ namespace rig::test {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kHidingCover = 0.3;   // of a stain, at which a sample counts as hidden
+constexpr double kHidingCover = 0.3;  // of a stain, at which a sample counts as hidden
 
 // An ellipse or a bent stroke that tapers off. Lengths in px.
 struct Stain {
@@ -64,9 +64,10 @@ class Painter {
     [[nodiscard]] double far_from_discs(double x, double y) const;
     // Somewhere on the middle of the head.
     void place(double& x, double& y) {
-        const double radius = 0.75 * c_.focal_px * c_.head_radius_mm /
-                              std::sqrt((c_.distance_mm + c_.head_radius_mm) * (c_.distance_mm + c_.head_radius_mm) -
-                                        c_.head_radius_mm * c_.head_radius_mm);
+        const double radius =
+            0.75 * c_.focal_px * c_.head_radius_mm /
+            std::sqrt((c_.distance_mm + c_.head_radius_mm) * (c_.distance_mm + c_.head_radius_mm) -
+                      c_.head_radius_mm * c_.head_radius_mm);
         const double angle = random_.uniform(0.0, kTurn);
         const double part = std::sqrt(random_.uniform(0.0, 1.0));
         x = 0.5 * c_.width_px + radius * part * std::cos(angle);
@@ -225,7 +226,8 @@ void Painter::lashes() {
         for (int i = 0; i < 14; ++i) {
             const double u = lid * ((i + 0.5) / 14.0 - 0.5);
             const double v = bend * u * u;
-            const double lean = angle + side * (0.5 * std::numbers::pi + 1.2 * u / lid) + random_.uniform(-0.15, 0.15);
+            const double lean =
+                angle + side * (0.5 * std::numbers::pi + 1.2 * u / lid) + random_.uniform(-0.15, 0.15);
             const double length = random_.uniform(5.0, 9.0) * mm_;
             paint({.x = x + u * std::cos(angle) - v * std::sin(angle) + 0.5 * length * std::cos(lean),
                    .y = y + u * std::sin(angle) + v * std::cos(angle) + 0.5 * length * std::sin(lean),

@@ -23,7 +23,7 @@ class FineField {
     [[nodiscard]] std::int16_t& owner(int u, int v) { return owner_[at(u, v)]; }
     void hide(int u, int v) { hidden_[at(u, v)] = 1; }
     [[nodiscard]] static double pixel_of(int sample) { return (sample + 0.5) / kFine - 0.5; }
-    [[nodiscard]] int first(double px) const;           // sample at or before this coordinate, inside the field
+    [[nodiscard]] int first(double px) const;  // sample at or before this coordinate, inside the field
     [[nodiscard]] int end(double px, int limit) const;  // one past the sample at or after it
     void note_hidden(std::vector<DiscTruth>& discs) const;
     [[nodiscard]] LightField pixels() const;

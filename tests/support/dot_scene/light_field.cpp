@@ -51,8 +51,8 @@ void smear(LightField& field, double length_px, double angle_rad) {
         const double v = dy - top;
         for (int y = 0; y < field.height; ++y) {
             for (int x = 0; x < field.width; ++x) {
-                const double upper = (1.0 - u) * source.clamped(x + left, y + top) +
-                                     u * source.clamped(x + left + 1, y + top);
+                const double upper =
+                    (1.0 - u) * source.clamped(x + left, y + top) + u * source.clamped(x + left + 1, y + top);
                 const double lower = (1.0 - u) * source.clamped(x + left, y + top + 1) +
                                      u * source.clamped(x + left + 1, y + top + 1);
                 field.at(x, y) += ((1.0 - v) * upper + v * lower) / steps;

@@ -69,9 +69,9 @@ class Loop {
         Observations observations;
         detector_->detect(picture.view(), observations, report);
         markers = observations.size();
-        proposal = control_.step({report.brightest_level, report.faintest_contrast,
-                                  static_cast<std::uint16_t>(markers), report.mean_luma,
-                                  report.saturated_fraction});
+        proposal =
+            control_.step({report.brightest_level, report.faintest_contrast,
+                           static_cast<std::uint16_t>(markers), report.mean_luma, report.saturated_fraction});
         if (proposal.changed) camera_.set(proposal);
     }
 
@@ -115,10 +115,12 @@ TEST(ExposureLoop, LightStepsAreTakenBackWithinASecond) {
                     loop.frame(lamp);
                     if (loop.proposal.changed) last_change = i;
                 }
-                std::printf("    %-6s lamp x %.2f: last change after %.2f s, level %.0f, contrast %.0f, %d us, %.1f dB\n",
-                            bright ? "bright" : "dark", lamp, last_change / kRate_hz,
-                            loop.report.brightest_level, loop.report.faintest_contrast,
-                            loop.proposal.exposure_us, static_cast<double>(loop.proposal.gain_db));
+                std::printf(
+                    "    %-6s lamp x %.2f: last change after %.2f s, level %.0f, contrast %.0f, %d us, %.1f "
+                    "dB\n",
+                    bright ? "bright" : "dark", lamp, last_change / kRate_hz, loop.report.brightest_level,
+                    loop.report.faintest_contrast, loop.proposal.exposure_us,
+                    static_cast<double>(loop.proposal.gain_db));
                 EXPECT_LE(last_change, 60) << "seed " << seed << ", lamp " << lamp;
                 EXPECT_NEAR(loop.report.brightest_level, 165.0, 45.0);
                 EXPECT_GE(loop.report.faintest_contrast, 20.0);
@@ -173,8 +175,8 @@ TEST(ExposureControlProperties, AnyLatencyAndAnyLightWithinReachSettle) {
         config.mains_hz = random.chance(0.3) ? 50.0 : 0.0;
         ExposureControl control;
         ASSERT_TRUE(control.configure(config));
-        const double most = std::min(config.blur_limit_us, config.longest_us) *
-                            std::pow(10.0, config.most_gain_db / 20.0);
+        const double most =
+            std::min(config.blur_limit_us, config.longest_us) * std::pow(10.0, config.most_gain_db / 20.0);
         // Grey levels per microsecond such that the target is within the range.
         const double sensitivity = 163.0 / std::exp(random.uniform(std::log(30.0), std::log(0.8 * most)));
         const auto latency = static_cast<std::size_t>(random.below(4));
@@ -200,13 +202,20 @@ TEST(ExposureControlProperties, AnyReadingsGiveFiniteProposalsInRange) {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const auto wild = [&](double most) {
         switch (random.below(8)) {
-            case 0: return kNan;
-            case 1: return kInfinity;
-            case 2: return -kInfinity;
-            case 3: return -1e300;
-            case 4: return 1e300;
-            case 5: return 0.0;
-            default: return random.uniform(0.0, most);
+            case 0:
+                return kNan;
+            case 1:
+                return kInfinity;
+            case 2:
+                return -kInfinity;
+            case 3:
+                return -1e300;
+            case 4:
+                return 1e300;
+            case 5:
+                return 0.0;
+            default:
+                return random.uniform(0.0, most);
         }
     };
     for (int round = 0; round < 200; ++round) {

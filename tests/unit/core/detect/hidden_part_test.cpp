@@ -78,8 +78,9 @@ TEST(HiddenPart, MoreThanTwoFifthsAreLeftAsTheyAre) {
 
 TEST(HiddenPart, EmptyAndFlatMomentsDoNoHarm) {
     const BitRows hidden = box(10, 10, 20, 20);
-    for (const SoftMoments& seen : {SoftMoments{}, SoftMoments{.weight = 4.0, .x = 12.0, .y = 12.0},
-                                    SoftMoments{.weight = 4.0, .x = 12.0, .y = 12.0, .xx = 1e-9, .yy = 4.0}}) {
+    for (const SoftMoments& seen :
+         {SoftMoments{}, SoftMoments{.weight = 4.0, .x = 12.0, .y = 12.0},
+          SoftMoments{.weight = 4.0, .x = 12.0, .y = 12.0, .xx = 1e-9, .yy = 4.0}}) {
         const SoftMoments done = complete_moments(seen, hidden, 48);
         EXPECT_TRUE(std::isfinite(done.x) && std::isfinite(done.y) && std::isfinite(done.weight));
     }
@@ -91,7 +92,8 @@ TEST(HiddenPart, MarksWhatIsBeyondTheSkinAndOneStepAround) {
     w->height = 32;
     w->blob = box(10, 10, 20, 20);
     for (std::size_t y = 0; y < 32; ++y)
-        for (std::size_t x = 0; x < 32; ++x) w->cover[y][x] = y >= 10 && y < 20 && x >= 10 && x < 20 ? 256 : 0;
+        for (std::size_t x = 0; x < 32; ++x)
+            w->cover[y][x] = y >= 10 && y < 20 && x >= 10 && x < 20 ? 256 : 0;
     BitRows hidden{};
     EXPECT_FALSE(mark_hidden(*w, 0.02, hidden));
     w->cover[12][19] = -200;

@@ -111,10 +111,11 @@ TEST(ExposureControl, WholeFlashesOfTheLampsWhereTheyFit) {
     config.blur_limit_us = 4000.0;
     ExposureControl fast = control(config);
     EXPECT_TRUE(has(fast.step({}), ExposureTrouble::kFlicker));
-    config = {.longest_us = 20000.0, .blur_limit_us = 20000.0, .mains_hz = 60.0, .start_exposure_us = 16000.0};
+    config = {
+        .longest_us = 20000.0, .blur_limit_us = 20000.0, .mains_hz = 60.0, .start_exposure_us = 16000.0};
     ExposureControl sixty = control(config);
-    const ExposureProposal q =
-        settle(sixty, [](const ExposureProposal& now) { return std::min(255.0, 2.0 + 0.01 * light_of(now)); });
+    const ExposureProposal q = settle(
+        sixty, [](const ExposureProposal& now) { return std::min(255.0, 2.0 + 0.01 * light_of(now)); });
     EXPECT_NEAR(q.exposure_us % 8333, 0, 1);
 }
 
@@ -149,7 +150,8 @@ TEST(ExposureControl, WithoutMarkersThePictureLeads) {
     EXPECT_TRUE(has(p, ExposureTrouble::kTooDark));
     ExposureControl flooded = control({});
     p = flooded.step({});
-    for (int frame = 0; frame < 60; ++frame) p = flooded.step({.mean_luma = 250.0, .saturated_fraction = 0.9});
+    for (int frame = 0; frame < 60; ++frame)
+        p = flooded.step({.mean_luma = 250.0, .saturated_fraction = 0.9});
     EXPECT_TRUE(has(p, ExposureTrouble::kTooBright));
 }
 
