@@ -78,7 +78,7 @@ struct BenchOptions {
     int frozen_frames = 3;
     FilterChoice smoothing;
     const PaintedTake* take = &painted_take();  // outlives the bench
-    LampSource::Lamp lamp;  // none: cameras take no notice of exposure and gain
+    LampSource::Lamp lamp;                      // none: cameras take no notice of exposure and gain
     std::optional<ExposureConfig> exposure;
 };
 
