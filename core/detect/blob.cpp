@@ -5,6 +5,7 @@
 
 #include "core/base/math.hpp"
 #include "core/detect/blob_shape.hpp"
+#include "core/detect/hidden_part.hpp"
 #include "core/image/pixel_lanes.hpp"
 
 namespace rig {
@@ -356,21 +357,34 @@ bool redraw_blob(BlobWorkspace& w, int outline, Rejection& reason) {
     return true;
 }
 
-// Weights of the soft threshold over the blob and one step around it; filled holes count as blob.
+// The pixels of the blob whose neighbours are all in it.
+BitRows interior(const BlobWorkspace& w) {
+    BitRows inner = w.blob;
+    for (std::uint64_t& row : inner) row = ~row;
+    grow_square(inner, w.height);
+    for (std::size_t y = 0; y < inner.size(); ++y) inner[y] = w.blob[y] & ~inner[y];
+    return inner;
+}
+
+// Weights of the soft threshold over the blob and one step around it. What lies within it counts as blob
+// whatever it looks like: glints that are dimmer than skin.
 SoftMoments soft_moments(BlobWorkspace& w, int outline) {
     BitRows& region = w.scratch;
     region = w.blob;
     grow_square(region, w.height);
-    for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) region[y] &= ~w.foreign[y];
+    for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y)
+        region[y] &= ~w.foreign[y] & ~w.hidden[y];
+    const BitRows inner = interior(w);
     const int low = outline - kRamp;
     const int high = outline + kRamp;
     std::int64_t n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
     for (int y = 0; y < w.height; ++y) {
-        const std::uint64_t inside = w.blob[static_cast<std::size_t>(y)];
+        const std::uint64_t rim = w.blob[static_cast<std::size_t>(y)];
+        const std::uint64_t inside = inner[static_cast<std::size_t>(y)];
         int rn = 0, rx = 0, rxx = 0;
         for (std::uint64_t bits = region[static_cast<std::size_t>(y)]; bits != 0; bits &= bits - 1) {
             const int x = std::countr_zero(bits);
-            const int least = (inside >> x & 1U) != 0 ? outline : low;
+            const int least = (inside >> x & 1U) != 0 ? high : (rim >> x & 1U) != 0 ? outline : low;
             const int weight = std::clamp(cover_at(w, x, y), least, high) - low;
             rn += weight, rx += weight * x, rxx += weight * x * x;
         }
@@ -411,7 +425,8 @@ double outline_deviation_px(const BlobWorkspace& w, const SoftMoments& m, double
             const auto end = static_cast<int>(std::clamp(middle + half, -1.0, 63.0) + 1.0);
             if (begin < end) ellipse = bit_span(begin, end);
         }
-        wrong += ones(ellipse ^ w.blob[static_cast<std::size_t>(y)]);
+        wrong +=
+            ones((ellipse ^ w.blob[static_cast<std::size_t>(y)]) & ~w.hidden[static_cast<std::size_t>(y)]);
     }
     return wrong / (6.283185307179586 * mean_radius_px);
 }
@@ -467,7 +482,9 @@ void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, c
         return;
     }
     draw_surroundings(w);
-    const SoftMoments moments = soft_moments(w, outline);
+    const bool is_hidden = mark_hidden(w, fit.rms / blob.contrast, w.hidden);
+    SoftMoments moments = soft_moments(w, outline);
+    if (is_hidden) moments = complete_moments(moments, w.hidden, w.height);
     if (moments.weight <= 0.0) {
         blob.rejection = Rejection::kSmall;
         return;

@@ -69,6 +69,7 @@ struct BlobWorkspace {
         cover{};  // 0..256: part of a pixel that is blob
     BitRows blob{};
     BitRows foreign{};  // nearer to another part of the same component
+    BitRows hidden{};   // neither paint nor skin: a glint on ink, a lash on retro-reflective paint
     BitRows moat{};
     BitRows ring{};
     BitRows scratch{};

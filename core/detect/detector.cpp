@@ -379,6 +379,30 @@ void Detector::hand_on(const SideResult& result, Observations& observations, Det
     }
 }
 
+// What exposure control goes by. A tenth either way leaves out what is no marker after all.
+void Detector::measure_markers(const SideResult& result, DetectorReport& report) const {
+    std::array<float, kMaxCandidates> levels{};
+    std::array<float, kMaxCandidates> contrasts{};
+    std::size_t count = 0;
+    for (const Blob& blob : result.blobs) {
+        if (blob.rejection != Rejection::kNone || blob.score < config_.min_score) continue;
+        // Bright sides are measured inverted: there the paint, not the skin, is the brighter one.
+        const bool dark = report.polarity == MarkerPolarity::kDark;
+        const double level = dark ? blob.background : 255.0 - blob.background + blob.contrast;
+        levels[count] = static_cast<float>(std::clamp(level, 0.0, 255.0));
+        contrasts[count++] = static_cast<float>(std::clamp(blob.contrast, 0.0, 255.0));
+    }
+    if (count == 0) return;
+    const std::size_t tenth = count / 10;
+    const auto at = [count](auto& values, std::size_t rank) {
+        const auto place = values.begin() + static_cast<std::ptrdiff_t>(rank);
+        std::nth_element(values.begin(), place, values.begin() + static_cast<std::ptrdiff_t>(count));
+        return static_cast<double>(*place);
+    };
+    report.brightest_level = at(levels, count - 1 - tenth);
+    report.faintest_contrast = at(contrasts, tenth);
+}
+
 // Which side the markers are on. Both are tried until the decision has settled, and again when that side
 // fails.
 std::size_t Detector::look(const ImageView& image, const BlockGrid& means, DetectorReport& report) {
@@ -416,6 +440,7 @@ void Detector::finish(std::size_t side, Observations& observations, DetectorRepo
     report.polarity = side == 0 ? MarkerPolarity::kDark : MarkerPolarity::kBright;
     state_.usual_size_px = usual_size(result.blobs);
     hand_on(result, observations, report);
+    measure_markers(result, report);
     if (report.runs_full || report.blobs_full || report.observations_full) {
         report.faults |= fault_bit(Fault::kBlobCapacity);
     }

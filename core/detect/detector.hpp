@@ -60,8 +60,11 @@ struct DetectorReport {
     MarkerPolarity polarity = MarkerPolarity::kDark;  // the side the observations come from
     double mean_luma = 0.0;                           // grey levels
     double saturated_fraction = 0.0;
-    std::uint8_t exposure = 0;  // ExposureFlag bits
-    FaultMap faults = 0;        // kExposure, kBlobCapacity
+    // Of the observations handed on, grey levels; 0 without any. Skin beside ink, paint of bright markers.
+    double brightest_level = 0.0;    // brighter side of a marker: a tenth of the markers are brighter
+    double faintest_contrast = 0.0;  // a tenth of the markers have less
+    std::uint8_t exposure = 0;       // ExposureFlag bits
+    FaultMap faults = 0;             // kExposure, kBlobCapacity
 };
 
 // Of the background at the scale of the largest marker.
@@ -184,6 +187,7 @@ class Detector {
     void apply_population(Side side, SideResult& result) const;
     [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);
     void decide(std::size_t dark_or_bright);
+    void measure_markers(const SideResult& result, DetectorReport& report) const;
     void hand_on(const SideResult& result, Observations& observations, DetectorReport& report) const;
 
     DetectorConfig config_;

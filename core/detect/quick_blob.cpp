@@ -23,10 +23,11 @@ constexpr int kCoarse = 16;      // fixed point of a distance from the backgroun
 constexpr int kFine = 32;        // and of an outline
 constexpr int kReach = 1;        // px that the outline may lie outside the start
 constexpr double kFullWeight = 255.0;
-constexpr double kSure = 0.8;       // badness of a marker above which it is measured again, slowly
-constexpr double kSteepest = 0.8;   // change of the light from the window's centre to its corner
-constexpr double kSpread = 0.2;     // of the contrast, that the skin around may stray from its plane
-constexpr double kCleanRim = 0.97;  // of the rim is skin: nothing reaches the blob from outside
+constexpr double kSure = 0.8;        // badness of a marker above which it is measured again, slowly
+constexpr double kBeyondSkin = 0.4;  // of the contrast, by which a pixel that is neither paint nor skin shows
+constexpr double kSteepest = 0.8;    // change of the light from the window's centre to its corner
+constexpr double kSpread = 0.2;      // of the contrast, that the skin around may stray from its plane
+constexpr double kCleanRim = 0.97;   // of the rim is skin: nothing reaches the blob from outside
 
 // Over the pixels that count: x and y from the window's centre, t = grey level - guess.
 struct RimSums {
@@ -164,7 +165,8 @@ class QuickMeasure {
     [[nodiscard]] Slope level_at(double part, double scale, double contrast) const;
     [[nodiscard]] std::uint64_t marked(const Slope& level, int y, std::uint64_t look) const;
     bool draw(double outline, double contrast);
-    [[nodiscard]] SoftMoments moments(double outline, double contrast) const;
+    // Sets hidden_ too.
+    [[nodiscard]] SoftMoments moments(double outline, double contrast);
     [[nodiscard]] SoftMoments gather(const std::array<WeightLanes, kChunks>& lanes, int bottom,
                                      double full) const;
     [[nodiscard]] double deviation_px(const SoftMoments& m, double radius_px) const;
@@ -182,9 +184,10 @@ class QuickMeasure {
     int centre_y_;
     int guess_ = 0;  // grey level of the skin around
     Plane plane_;
-    double rms_ = 0.0;    // of the skin about the plane
-    double clean_ = 0.0;  // part of the rim that is skin
-    int first_ = 0;       // rows of the blob: [first_, last_]
+    double rms_ = 0.0;     // of the skin about the plane
+    double clean_ = 0.0;   // part of the rim that is skin
+    bool hidden_ = false;  // something that is neither paint nor skin lies on the blob
+    int first_ = 0;        // rows of the blob: [first_, last_]
     int last_ = 0;
 };
 
@@ -355,7 +358,7 @@ bool QuickMeasure::draw(double outline, double contrast) {
 
 // Weights of the soft threshold over the blob and one step around it. They are in grey levels, larger where
 // there is more light; gather() takes that out.
-SoftMoments QuickMeasure::moments(double outline, double contrast) const {
+SoftMoments QuickMeasure::moments(double outline, double contrast) {
     const double scale =
         static_cast<double>(static_cast<int>(kFullWeight / (2.0 * kSoftRamp * contrast)) + 1);
     const Slope low = level_at(outline - kSoftRamp, scale, contrast);
@@ -363,6 +366,7 @@ SoftMoments QuickMeasure::moments(double outline, double contrast) const {
     const Slope full(2.0 * kSoftRamp * contrast, plane_.slope_x * per_light, plane_.slope_y * per_light,
                      scale, centre_x_, chunks_);
     std::array<WeightLanes, kChunks> lanes{};
+    PixelLanes deepest = all_lanes(0);
     std::uint64_t above = 0;
     std::uint64_t here = 0;
     std::uint64_t below = w_.blob[static_cast<std::size_t>(first_)];
@@ -381,10 +385,14 @@ SoftMoments QuickMeasure::moments(double outline, double contrast) const {
             const PixelLanes most = full.column(chunk) + full_row;
             const PixelLanes floored = over > all_lanes(0) ? over : all_lanes(0);
             const PixelLanes weight = floored < most ? floored : most;
-            lanes[static_cast<std::size_t>(chunk)].add(weight &
-                                                       lanes_of_bits(region >> (chunk * kPixelLanes)));
+            const PixelLanes inside = lanes_of_bits(region >> (chunk * kPixelLanes));
+            lanes[static_cast<std::size_t>(chunk)].add(weight & inside);
+            const PixelLanes under = over & inside;
+            deepest = under < deepest ? under : deepest;
         }
     }
+    const double skin = (outline - kSoftRamp + kBeyondSkin) * contrast * scale;
+    for (int lane = 0; lane < kPixelLanes; ++lane) hidden_ = hidden_ || deepest[lane] < -skin;
     return gather(lanes, last_ + 1, scale * 2.0 * kSoftRamp * contrast);
 }
 
@@ -521,6 +529,7 @@ bool QuickMeasure::run(Blob& blob) {
         judge(kDeepOutline, blob);
         blob.badness += kDeepBadness;
     }
+    if (hidden_ || blob.rejection == Rejection::kIrregular) return false;
     return blob.rejection != Rejection::kNone || blob.badness < kSure;
 }
 

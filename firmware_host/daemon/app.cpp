@@ -54,6 +54,9 @@ App::App(const AppParts& parts, const AppConfig& config)
     for (FrameSource* camera : parts_.cameras) {
         feeds_.push_back(std::make_unique<CameraFeed>(*camera, parts_.clock, config_.feed));
     }
+    for (ExposureControl& each : exposures_) {
+        if (config_.exposure) RIG_CHECK(each.configure(*config_.exposure).has_value());
+    }
     started_us_ = parts_.clock.now_us();
     port_.adopt();
 }
@@ -86,11 +89,28 @@ FaultMap App::take_feed_faults() {
 
 void App::tick(const FrameSet& frames, FaultMap faults) {
     poll_button();
-    solver_.tick(frames, faults, output_);
+    solver_.tick(frames, faults | exposure_faults_, output_);
+    expose(frames);
     output_.health.uptime_us = std::max<std::int64_t>(parts_.clock.now_us() - started_us_, 0);
     last_tick_us_ = parts_.clock.now_us();
     show_state();
     parts_.watchdog.feed();
+}
+
+// What each camera's detector has just measured leads that camera. In SAFE nothing is measured.
+void App::expose(const FrameSet& frames) {
+    exposure_faults_ = 0;
+    if (!config_.exposure || parts_.pack == nullptr) return;
+    for (std::size_t c = 0; c < feeds_.size(); ++c) {
+        if (frames.images[c].empty()) continue;
+        const DetectorReport& seen = parts_.pipeline.detector_report(c);
+        const LightReading reading{seen.brightest_level, seen.faintest_contrast,
+                                   static_cast<std::uint16_t>(parts_.pipeline.observations(c).size()),
+                                   seen.mean_luma, seen.saturated_fraction};
+        const ExposureProposal proposal = exposures_[c].step(reading);
+        if (proposal.changed) feeds_[c]->request_exposure(proposal.exposure_us, proposal.gain_db);
+        exposure_faults_ |= proposal.faults;
+    }
 }
 
 void App::poll_button() {

@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "core/expose/exposure_control.hpp"
 #include "firmware_host/daemon/camera_feed.hpp"
 #include "firmware_host/daemon/control.hpp"
 #include "firmware_host/daemon/link_port.hpp"
@@ -50,6 +51,7 @@ struct AppParts {
 struct AppConfig {
     double rate_hz = 60.0;
     CameraFeedConfig feed;
+    std::optional<ExposureConfig> exposure;  // none: cameras keep the exposure they have
     BoardIdentity identity;
     Vitals vitals;
     std::int64_t host_patience_us =
@@ -83,6 +85,7 @@ class App {
     [[nodiscard]] bool gather(std::array<std::optional<CameraFrame>, kMaxCameras>& frames);
     void catch_up(std::array<std::optional<CameraFrame>, kMaxCameras>& frames);
     void tick(const FrameSet& frames, FaultMap faults);
+    void expose(const FrameSet& frames);
     [[nodiscard]] FaultMap take_feed_faults();
     void serve_link_until_drained(const std::atomic<bool>& stop);
     void poll_button();
@@ -94,6 +97,8 @@ class App {
     AppParts parts_;
     AppConfig config_;
     std::vector<std::unique_ptr<CameraFeed>> feeds_;
+    std::array<ExposureControl, kMaxCameras> exposures_;
+    FaultMap exposure_faults_ = 0;  // of the last tick
     TickSolver solver_;
     LinkPort port_;
     Control control_;

@@ -1,6 +1,7 @@
 #include "firmware_host/daemon/camera_feed.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 
 namespace rig {
@@ -44,6 +45,7 @@ Result<FrameFormat, FrameError> CameraFeed::open() {
     const auto format = source_.start();
     running_ = format.has_value();
     last_usable_us_ = clock_.now_us();
+    passed_exposure_ = 0;
     if (running_) {
         back_off_us_ = 0;
         set_status(CameraStatus::kMissing);
@@ -137,8 +139,24 @@ CameraFeed::Verdict CameraFeed::judge(const CameraFrame& frame) {
     return Verdict::kSkip;
 }
 
+void CameraFeed::request_exposure(std::int32_t exposure_us, float gain_db) {
+    const auto high = std::uint64_t{static_cast<std::uint32_t>(exposure_us)} << 32;
+    wanted_exposure_.store(high | std::bit_cast<std::uint32_t>(gain_db), std::memory_order_relaxed);
+}
+
+void CameraFeed::pass_exposure_on() {
+    const std::uint64_t wanted = wanted_exposure_.load(std::memory_order_relaxed);
+    if (wanted == passed_exposure_) return;
+    passed_exposure_ = wanted;
+    const bool timed = source_.set_exposure_us(static_cast<std::int32_t>(wanted >> 32)).has_value();
+    const bool gained =
+        source_.set_gain_db(std::bit_cast<float>(static_cast<std::uint32_t>(wanted))).has_value();
+    if (!timed || !gained) refusals_.fetch_add(1, std::memory_order_relaxed);
+}
+
 std::optional<CameraFrame> CameraFeed::take(std::int64_t deadline_us) {
     for (int attempt = 0; attempt < kDiscardsPerTake && is_running(); ++attempt) {
+        pass_exposure_on();
         const auto frame = source_.wait_frame(deadline_us);
         if (!frame) {
             if (!go_on_after(frame.error())) return std::nullopt;

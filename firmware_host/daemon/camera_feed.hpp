@@ -34,6 +34,12 @@ class CameraFeed {
     [[nodiscard]] std::optional<CameraFrame> take(std::int64_t deadline_us);
     void release(const CameraFrame& frame) { source_.release(frame.token); }
 
+    // Any thread: before the next frame is waited for, the camera gets these. The newest request counts; a
+    // camera that is opened again gets it again.
+    void request_exposure(std::int32_t exposure_us, float gain_db);
+    // How often the camera refused a request.
+    [[nodiscard]] std::uint32_t refusals() const { return refusals_.load(std::memory_order_relaxed); }
+
     // Any thread.
     [[nodiscard]] CameraStatus status() const { return status_.load(std::memory_order_relaxed); }
     [[nodiscard]] bool ended() const { return ended_.load(std::memory_order_relaxed); }
@@ -49,6 +55,7 @@ class CameraFeed {
     [[nodiscard]] bool is_frozen(const CameraFrame& frame);
     void lose();
     void note_io_error();
+    void pass_exposure_on();
     void raise(Fault fault) { faults_.fetch_or(fault_bit(fault), std::memory_order_relaxed); }
     void set_status(CameraStatus status) { status_.store(status, std::memory_order_relaxed); }
 
@@ -58,6 +65,9 @@ class CameraFeed {
     std::atomic<CameraStatus> status_{CameraStatus::kMissing};
     std::atomic<bool> ended_{false};
     std::atomic<FaultMap> faults_{0};
+    std::atomic<std::uint64_t> wanted_exposure_{0};  // microseconds and the bits of the gain; 0: none yet
+    std::atomic<std::uint32_t> refusals_{0};
+    std::uint64_t passed_exposure_ = 0;
     bool running_ = false;
     bool any_frame_ = false;
     std::int64_t last_capture_us_ = 0;

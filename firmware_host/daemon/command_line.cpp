@@ -89,6 +89,25 @@ void add_filter_options(CLI::App& app, FilterSettings& smoothing) {
         ->type_name("FRAMES");
 }
 
+void add_camera_options(CLI::App& app, CommandLine& into) {
+    const Choices<MarkerPolarity> polarities{{"auto", MarkerPolarity::kAuto},
+                                             {"dark", MarkerPolarity::kDark},
+                                             {"bright", MarkerPolarity::kBright}};
+    add_choice(app, "--polarity", polarities, into.pipeline.polarity,
+               "What the markers are: auto, dark or bright");
+    app.add_flag("--auto-exposure", into.auto_exposure,
+                 "Set exposure and gain of the cameras by the light at the markers");
+    app.add_option("--max-exposure-us", into.most_exposure_us,
+                   "Longest exposure that motion blur allows, microseconds; gain beyond")
+        ->check(CLI::Range(100.0, 33000.0).description(""))
+        ->capture_default_str()
+        ->type_name("US");
+    app.add_option("--mains", into.mains_hz, "Lamps flicker with the mains: 50 or 60 Hz; 0: they do not")
+        ->check(CLI::IsMember({0, 50, 60}).description(""))
+        ->capture_default_str()
+        ->type_name("HZ");
+}
+
 }  // namespace
 
 bool parse_command_line(int argc, char** argv, CommandLine& into, int& exit_code) {
@@ -101,9 +120,6 @@ bool parse_command_line(int argc, char** argv, CommandLine& into, int& exit_code
                                             {"threads", ExecutorChoice::kThreads},
                                             {"lockstep", ExecutorChoice::kLockstep}};
     const Choices<LossPolicy> policies{{"hold", LossPolicy::kHold}, {"decay", LossPolicy::kDecay}};
-    const Choices<MarkerPolarity> polarities{{"auto", MarkerPolarity::kAuto},
-                                             {"dark", MarkerPolarity::kDark},
-                                             {"bright", MarkerPolarity::kBright}};
     bool no_filter = false;
     bool no_stabilise = false;
     std::string streams;
@@ -135,8 +151,7 @@ bool parse_command_line(int argc, char** argv, CommandLine& into, int& exit_code
     app.add_flag("--no-stabilise", no_stabilise, "Take the markers as already aligned with the face");
     add_choice(app, "--loss-policy", policies, into.pipeline.loss_policy,
                "When the face is lost: hold, or decay to rest");
-    add_choice(app, "--polarity", polarities, into.pipeline.polarity,
-               "What the markers are: auto, dark or bright");
+    add_camera_options(app, into);
     app.add_option("--log-observations", into.log_observations,
                    "Record what detection sees, for headrig replay")
         ->type_name("FILE");

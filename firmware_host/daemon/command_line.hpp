@@ -37,6 +37,9 @@ struct CommandLine {
     FilterSettings smoothing;  // what is said here goes before the board's
     double world_timeout_s = 30.0;
     double wait_host_s = 0.0;
+    bool auto_exposure = false;
+    double most_exposure_us = 4000.0;  // what motion allows
+    int mains_hz = 0;                  // of lamps that flicker; 0: none
     bool require_pack = false;
     bool digest = false;
     bool real_time = false;

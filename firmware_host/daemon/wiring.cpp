@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <fstream>
 #include <random>
@@ -91,6 +92,16 @@ Result<sim::FaultPlan, WiringError> load_faults(const std::string& path) {
         return refuse(kExitInput,
                       fmt::format("{}: line {}: {}", path, plan.error().line, plan.error().reason));
     return std::move(*plan);
+}
+
+// A frame has to end before the next one begins; a tenth of the period is for reading it out.
+ExposureConfig exposure_config(const CommandLine& command_line, double rate_hz) {
+    ExposureConfig config;
+    config.blur_limit_us = command_line.most_exposure_us;
+    config.longest_us = std::max(0.9e6 / rate_hz, config.shortest_us);
+    config.start_exposure_us = std::min({config.start_exposure_us, config.blur_limit_us, config.longest_us});
+    config.mains_hz = command_line.mains_hz;
+    return config;
 }
 
 class WorldPaceOf final : public Pace {
@@ -315,6 +326,7 @@ Result<void, WiringError> Wiring::Rig::assemble_app(const CommandLine& command_l
     config.rate_hz = board.rate_hz;
     config.feed.rate_hz = board.rate_hz;
     config.feed.frozen_frames = board.frozen_frames;
+    if (command_line.auto_exposure) config.exposure = exposure_config(command_line, board.rate_hz);
     config.identity = identity(command_line);
     config.vitals = {heap_calls_after_seal, os::peak_memory_kb};
     config.wait_for_host_us = static_cast<std::int64_t>(command_line.wait_host_s * 1e6);

@@ -41,6 +41,7 @@ const std::vector<Room>& rooms() {
         {"core/geometry", kGround},
         {"core/pack", with_ground({"core/geometry"})},
         {"core/detect", with_ground({"core/image", "core/geometry"})},
+        {"core/expose", kGround},
         {"core/track", with_ground({"core/geometry", kPackView, kDetectOutput})},
         {"core/stabilise", with_ground({"core/geometry", kPackView, kDetectOutput, kTrackOutput})},
         {"core/infer", with_ground({"core/geometry", kPackView, kTrackOutput, kStabiliseOutput})},

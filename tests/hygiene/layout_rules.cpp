@@ -16,11 +16,12 @@ constexpr int kMaxReadmeLines = 80;  // a page
 constexpr int kFaultCount = 55;      // of the reliability catalogue
 
 // Folders that explain themselves. One that does not exist yet is passed over.
-constexpr std::array<std::string_view, 24> kReadmeFolders{"core",
+constexpr std::array<std::string_view, 25> kReadmeFolders{"core",
                                                           "core/base",
                                                           "core/image",
                                                           "core/geometry",
                                                           "core/detect",
+                                                          "core/expose",
                                                           "core/track",
                                                           "core/stabilise",
                                                           "core/infer",

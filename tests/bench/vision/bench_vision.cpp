@@ -16,6 +16,7 @@
 
 #include "core/detect/detector.hpp"
 #include "tests/bench/vision/opencv_methods.hpp"
+#include "tests/support/dot_scene/disc_scene.hpp"
 #include "tests/support/dot_scene/dot_scene.hpp"
 #include "tests/support/dot_scene/match.hpp"
 #include "tests/support/image_truth/image_truth.hpp"
@@ -35,6 +36,7 @@ struct BenchFrame {
 
 struct Method {
     const char* name;
+    const char* short_name;
     std::function<std::vector<test::SeenDot>(const BenchFrame&)> look;
     bool counts_only = false;
 };
@@ -106,6 +108,53 @@ std::vector<ExpectedMarker> predictions(const BenchFrame& frame) {
     return expected;
 }
 
+std::string disc_set(test::Disturbance disturbance, bool bright) {
+    return fmt::format("{} discs, {}", bright ? "bright" : "dark", test::name_of(disturbance));
+}
+
+// Discs on a round head; the truth is the projected 3D centre. Clean ones for accuracy, others for what
+// hurts.
+void add_discs(std::vector<BenchFrame>& frames) {
+    for (int k = 0; k < static_cast<int>(test::Disturbance::kCount); ++k) {
+        for (std::uint64_t i = 0; i < 8; ++i) {
+            test::DiscSceneConfig config;
+            config.disturbance = static_cast<test::Disturbance>(k);
+            config.bright = i % 2 == 1;
+            config.seed = 700 + i;
+            config.head_radius_mm = 60.0 + 4.0 * static_cast<double>(i);
+            config.texture = config.disturbance == test::Disturbance::kNone ? 0.0 : 0.04;
+            test::DiscPicture picture = test::render(config);
+            auto dots = test::true_dots(picture);
+            frames.push_back({disc_set(config.disturbance, config.bright), std::move(picture.picture),
+                              std::move(dots), config.bright});
+        }
+    }
+}
+
+// One row per disturbance: recall and precision of each method.
+void print_disturbances(const std::vector<BenchFrame>& frames, const std::vector<Method>& methods) {
+    fmt::print("\n{:<34}", "recall / precision");
+    for (const Method& method : methods) {
+        if (!method.counts_only) fmt::print("{:>17.16}", method.short_name);
+    }
+    fmt::print("\n");
+    for (const bool bright : {false, true}) {
+        for (int k = 0; k < static_cast<int>(test::Disturbance::kCount); ++k) {
+            const std::string set = disc_set(static_cast<test::Disturbance>(k), bright);
+            fmt::print("{:<34}", set);
+            for (const Method& method : methods) {
+                if (method.counts_only) continue;
+                test::MatchCounts counts;
+                for (const BenchFrame& frame : frames) {
+                    if (frame.set == set) counts += test::match(frame.dots, method.look(frame));
+                }
+                fmt::print("{:>9.3f} / {:.3f}", counts.recall(), counts.precision());
+            }
+            fmt::print("\n");
+        }
+    }
+}
+
 std::vector<test::SeenDot> run_detector(Detector& detector, const BenchFrame& frame,
                                         MarkerPolarity polarity) {
     DetectorConfig config;
@@ -173,6 +222,7 @@ int main(int argc, char** argv) {
     std::vector<BenchFrame> frames;
     add_shared_faces(frames);
     add_scenes(frames);
+    add_discs(frames);
     const auto detector = std::make_unique<Detector>();
     volatile std::size_t sink = 0;
     // One for each polarity, as each camera of a rig has its own.
@@ -190,26 +240,26 @@ int main(int argc, char** argv) {
     };
     const std::vector<std::vector<ExpectedMarker>> expected = make_predictions();
     const std::vector<Method> methods = {
-        {"detector, whole image",
+        {"detector, whole image", "whole image",
          [&](const BenchFrame& f) { return run_settled(*settled[f.bright], f, {}); }},
-        {"detector, windows about predictions",
+        {"detector, windows about predictions", "windows",
          [&](const BenchFrame& f) {
              return run_settled(*settled[f.bright], f,
                                 expected[static_cast<std::size_t>(&f - frames.data())]);
          }},
-        {"detector, first frame",
+        {"detector, first frame", "detector",
          [&](const BenchFrame& f) {
              return run_detector(*detector, f, f.bright ? MarkerPolarity::kBright : MarkerPolarity::kDark);
          }},
-        {"detector, polarity found (first frames)",
+        {"detector, polarity found (first frames)", "polarity found",
          [&](const BenchFrame& f) { return run_detector(*detector, f, MarkerPolarity::kAuto); }},
-        {"OpenCV SimpleBlobDetector",
+        {"OpenCV SimpleBlobDetector", "SimpleBlob",
          [](const BenchFrame& f) { return bench::simple_blob_detector(f.picture.view(), f.bright); }},
-        {"OpenCV threshold, findContours",
+        {"OpenCV threshold, findContours", "findContours",
          [](const BenchFrame& f) { return bench::threshold_contours(f.picture.view(), f.bright); }},
-        {"OpenCV threshold, connectedComponents",
+        {"OpenCV threshold, connectedComponents", "components",
          [](const BenchFrame& f) { return bench::threshold_components(f.picture.view(), f.bright); }},
-        {"plain threshold and count",
+        {"plain threshold and count", "",
          [&](const BenchFrame& f) {
              sink = sink + bench::threshold_count(f.picture.view(), f.bright);
              return std::vector<test::SeenDot>{};
@@ -218,5 +268,9 @@ int main(int argc, char** argv) {
     };
     print_table("faces", frames, methods, repeat);
     print_table("scenes", frames, methods, repeat);
+    for (const bool bright : {false, true}) {
+        print_table(disc_set(test::Disturbance::kNone, bright), frames, methods, repeat);
+    }
+    print_disturbances(frames, methods);
     return 0;
 }

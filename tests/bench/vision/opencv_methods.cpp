@@ -56,9 +56,14 @@ std::vector<test::SeenDot> simple_blob_detector(const ImageView& image, bool bri
 
 std::vector<test::SeenDot> threshold_contours(const ImageView& image, bool bright) {
     std::vector<std::vector<cv::Point>> contours;
-    cv::findContours(adaptive_mask(image, bright), contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
+    std::vector<cv::Vec4i> hierarchy;
+    // Not RETR_EXTERNAL: the outline of a head would hide every dot on it.
+    cv::findContours(adaptive_mask(image, bright), contours, hierarchy, cv::RETR_CCOMP,
+                     cv::CHAIN_APPROX_NONE);
     std::vector<test::SeenDot> seen;
-    for (const auto& contour : contours) {
+    for (std::size_t i = 0; i < contours.size(); ++i) {
+        const auto& contour = contours[i];
+        if (hierarchy[i][3] >= 0) continue;  // a hole
         const cv::Moments m = cv::moments(contour);
         const double length = cv::arcLength(contour, true);
         if (m.m00 < kLeastArea || m.m00 > kMostArea || 12.566 * m.m00 < 0.5 * length * length) continue;

@@ -80,13 +80,19 @@ DaemonBench::DaemonBench(BenchOptions options)
         pacing.frame_total = options_.frames;
         cameras_.push_back(std::make_unique<sim::SyntheticFrameSource>(
             clock, take.width_px(), take.height_px(), take.painter(c), pacing));
-        faulty_.push_back(std::make_unique<sim::FaultyFrameSource>(*cameras_[c], clock, options_.faults,
+        FrameSource* camera = cameras_[c].get();
+        if (options_.lamp) {
+            lit_.push_back(std::make_unique<LampSource>(*camera, options_.lamp));
+            camera = lit_.back().get();
+        }
+        faulty_.push_back(std::make_unique<sim::FaultyFrameSource>(*camera, clock, options_.faults,
                                                                    static_cast<std::uint8_t>(c)));
         parts.cameras.push_back(faulty_[c].get());
     }
     AppConfig config;
     config.rate_hz = kTakeRate_hz;
     config.feed.frozen_frames = options_.frozen_frames;
+    config.exposure = options_.exposure;
     if (options_.streams_by_itself) config.identity.first_streams.mask = kAllStreams;
     config.identity.hello.role = Role::kBoard;
     config.identity.hello.session_id = 77;

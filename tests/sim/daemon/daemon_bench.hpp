@@ -18,6 +18,7 @@
 #include "hal/sim/memory_frame_source.hpp"
 #include "hal/sim/memory_line.hpp"
 #include "hal/sim/memory_watchdog.hpp"
+#include "tests/sim/daemon/lamp_source.hpp"
 #include "tests/sim/daemon/painted_take.hpp"
 
 namespace rig::test {
@@ -77,6 +78,8 @@ struct BenchOptions {
     int frozen_frames = 3;
     FilterChoice smoothing;
     const PaintedTake* take = &painted_take();  // outlives the bench
+    LampSource::Lamp lamp;                      // none: cameras take no notice of exposure and gain
+    std::optional<ExposureConfig> exposure;
 };
 
 class DaemonBench {
@@ -92,6 +95,7 @@ class DaemonBench {
     std::atomic<bool> stop{false};
 
     [[nodiscard]] App& app() { return *app_; }
+    [[nodiscard]] const LampSource& lit_camera(std::size_t camera) const { return *lit_[camera]; }
     [[nodiscard]] std::uint32_t ticks_done() const { return pace_.ticks; }
     sim::ManualClock clock{1'000'000};
     HostTime wall;
@@ -114,6 +118,7 @@ class DaemonBench {
 
     BenchOptions options_;
     std::vector<std::unique_ptr<sim::SyntheticFrameSource>> cameras_;
+    std::vector<std::unique_ptr<LampSource>> lit_;
     std::vector<std::unique_ptr<sim::FaultyFrameSource>> faulty_;
     sim::FaultyLink link_;
     std::vector<std::string_view> names_;

@@ -501,6 +501,33 @@ TEST(DaemonLockstep, AFloodOfCommandsIsDropped) {
     EXPECT_GT(bench.app().health().fault_counts[static_cast<std::size_t>(Fault::kCommandFlood) - 1], 0);
 }
 
+// Light that rises and falls by four is taken back by exposure, and the face is live again within a second.
+TEST(DaemonLockstep, AutoExposureBringsTheFaceBackWhenTheLightChanges) {
+    const auto live_at_end = [](bool controlled, double lamp) {
+        BenchOptions options;
+        options.frames = 240;
+        options.lamp = [lamp](std::uint32_t frame) { return frame < 60 ? 1.0 : lamp; };
+        if (controlled) options.exposure = ExposureConfig{};
+        DaemonBench bench(options);
+        static_cast<void>(bench.run());
+        int live = 0;
+        for (std::size_t i = 150; i < bench.host.states.size(); ++i)
+            live += bench.host.states[i].state == TrackingState::kLive ? 1 : 0;
+        const double exposure_us = bench.lit_camera(0).exposure_us();
+        if (!controlled) {
+            EXPECT_EQ(exposure_us, LampSource::kNominal_us);
+        } else if (lamp > 1.0) {
+            EXPECT_LT(exposure_us, 1000.0);
+        } else {
+            EXPECT_GT(exposure_us, 3000.0);
+        }
+        return live;
+    };
+    EXPECT_EQ(live_at_end(true, 4.0), 90);
+    EXPECT_EQ(live_at_end(true, 0.25), 90);
+    EXPECT_LT(live_at_end(false, 6.0), 45);  // without control such light ends it
+}
+
 // A recorded take solves again to the same digest.
 TEST(DaemonLockstep, TheObservationLogRepeatsTheRun) {
     const TempFolder folder;

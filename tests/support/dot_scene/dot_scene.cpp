@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tests/support/dot_scene/light_field.hpp"
 #include "tests/support/random.hpp"
 
 namespace rig::test {
@@ -12,51 +13,9 @@ namespace {
 
 constexpr int kSamples = 5;  // per pixel and axis
 
-// A plane of doubles.
-struct Field {
-    int width = 0;
-    int height = 0;
-    std::vector<double> values;
-    Field(int w, int h, double value)
-        : width(w), height(h), values(static_cast<std::size_t>(w) * static_cast<std::size_t>(h), value) {}
-    double& at(int x, int y) {
-        return values[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-                      static_cast<std::size_t>(x)];
-    }
-    [[nodiscard]] double clamped(int x, int y) const {
-        const auto cx = static_cast<std::size_t>(std::clamp(x, 0, width - 1));
-        const auto cy = static_cast<std::size_t>(std::clamp(y, 0, height - 1));
-        return values[cy * static_cast<std::size_t>(width) + cx];
-    }
-};
-
-void blur(Field& field, double sigma) {
-    if (sigma <= 0.0) return;
-    const int reach = static_cast<int>(std::ceil(3.5 * sigma));
-    std::vector<double> kernel;
-    double sum = 0.0;
-    for (int i = -reach; i <= reach; ++i) {
-        kernel.push_back(std::exp(-0.5 * i * i / (sigma * sigma)));
-        sum += kernel.back();
-    }
-    for (const bool across : {true, false}) {
-        const Field source = field;
-        for (int y = 0; y < field.height; ++y) {
-            for (int x = 0; x < field.width; ++x) {
-                double total = 0.0;
-                for (int i = -reach; i <= reach; ++i) {
-                    total += kernel[static_cast<std::size_t>(i + reach)] *
-                             (across ? source.clamped(x + i, y) : source.clamped(x, y + i));
-                }
-                field.at(x, y) = total / sum;
-            }
-        }
-    }
-}
-
 // Multiplies the pixels near (cx, cy) by a factor, as far as inside(dx, dy) covers them.
 template <class Inside>
-void paint(Field& field, double cx, double cy, double reach, double factor, Inside inside) {
+void paint(LightField& field, double cx, double cy, double reach, double factor, Inside inside) {
     const int x0 = std::max(0, static_cast<int>(cx - reach - 1.0));
     const int x1 = std::min(field.width - 1, static_cast<int>(cx + reach + 2.0));
     const int y0 = std::max(0, static_cast<int>(cy - reach - 1.0));
@@ -77,7 +36,7 @@ void paint(Field& field, double cx, double cy, double reach, double factor, Insi
     }
 }
 
-void paint_ellipse(Field& field, double x, double y, double long_px, double short_px, double angle,
+void paint_ellipse(LightField& field, double x, double y, double long_px, double short_px, double angle,
                    double factor) {
     const double c = std::cos(angle);
     const double s = std::sin(angle);
@@ -92,7 +51,7 @@ void paint_ellipse(Field& field, double x, double y, double long_px, double shor
 
 // A chain of small discs along a bent line; every disc is drawn to its own part so that overlaps do not
 // multiply.
-void paint_stroke(Field& field, SeededRandom& random, double length, double width, double factor) {
+void paint_stroke(LightField& field, SeededRandom& random, double length, double width, double factor) {
     const double x0 = random.uniform(20.0, field.width - 20.0);
     const double y0 = random.uniform(20.0, field.height - 20.0);
     const double angle = random.uniform(0.0, 2.0 * std::numbers::pi);
@@ -105,11 +64,11 @@ void paint_stroke(Field& field, SeededRandom& random, double length, double widt
     });
 }
 
-void add_clutter(Field& albedo, const Scene& scene, SeededRandom& random) {
+void add_clutter(LightField& albedo, const Scene& scene, SeededRandom& random) {
     double dot = 10.0;
     for (const SceneDot& d : scene.dots) dot = std::max(dot, d.long_px);
     for (int i = 0; i < scene.clutter.shadows; ++i) {
-        Field shade(albedo.width, albedo.height, 1.0);
+        LightField shade(albedo.width, albedo.height, 1.0);
         const double size = random.uniform(1.5, 5.0) * dot;
         paint_ellipse(shade, random.uniform(0.0, albedo.width), random.uniform(0.0, albedo.height),
                       2.0 * size, size, random.uniform(0.0, 3.0), random.uniform(0.4, 0.8));
@@ -134,14 +93,14 @@ void add_clutter(Field& albedo, const Scene& scene, SeededRandom& random) {
 }
 
 // Paint on paint is paint: where dots overlap the stronger one counts, they do not multiply.
-void add_dots(Field& albedo, const Scene& scene, SeededRandom& random) {
-    Field layer(albedo.width, albedo.height, 1.0);
+void add_dots(LightField& albedo, const Scene& scene, SeededRandom& random) {
+    LightField layer(albedo.width, albedo.height, 1.0);
     for (const SceneDot& dot : scene.dots) {
         const double reach = 0.5 * dot.long_px + 2.0;
         const int x0 = static_cast<int>(dot.x_px - reach);
         const int y0 = static_cast<int>(dot.y_px - reach);
         const int side = static_cast<int>(2.0 * reach) + 2;
-        Field one(side, side, 1.0);
+        LightField one(side, side, 1.0);
         paint_ellipse(one, dot.x_px - x0, dot.y_px - y0, dot.long_px, dot.short_px, dot.angle_rad, dot.paint);
         if (dot.glint) {
             const double play = 0.2 * dot.short_px;
@@ -162,9 +121,9 @@ void add_dots(Field& albedo, const Scene& scene, SeededRandom& random) {
     for (std::size_t k = 0; k < albedo.values.size(); ++k) albedo.values[k] *= layer.values[k];
 }
 
-void add_light(Field& albedo, const Scene& scene, SeededRandom& random) {
+void add_light(LightField& albedo, const Scene& scene, SeededRandom& random) {
     const SceneLight& light = scene.light;
-    Field texture(albedo.width, albedo.height, 0.0);
+    LightField texture(albedo.width, albedo.height, 0.0);
     for (double& value : texture.values) value = random.normal(0.0, 1.0);
     blur(texture, 5.0);
     double square = 0.0;
@@ -189,19 +148,12 @@ void add_light(Field& albedo, const Scene& scene, SeededRandom& random) {
 
 Picture render(const Scene& scene) {
     SeededRandom random(scene.seed);
-    Field field(scene.width_px, scene.height_px, 1.0);
+    LightField field(scene.width_px, scene.height_px, 1.0);
     add_clutter(field, scene, random);
     add_dots(field, scene, random);
     add_light(field, scene, random);
     blur(field, scene.light.blur_px);
-    Picture picture{scene.width_px, scene.height_px, {}};
-    for (const double value : field.values) {
-        const double sigma =
-            std::sqrt(scene.light.read_noise * scene.light.read_noise + scene.light.shot_noise * value);
-        picture.pixels.push_back(
-            static_cast<std::uint8_t>(std::clamp(random.normal(value, sigma) + 0.5, 0.0, 255.0)));
-    }
-    return picture;
+    return digitise(field, scene.light.read_noise, scene.light.shot_noise, random);
 }
 
 Scene lattice_scene(double diameter_px, double max_aspect, bool bright, std::uint64_t seed) {

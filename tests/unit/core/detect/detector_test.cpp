@@ -78,6 +78,27 @@ TEST_F(DetectorTest, EvenImagesHoldNothing) {
     }
 }
 
+TEST_F(DetectorTest, LightAtTheMarkersIsMeasuredForExposureControl) {
+    for (const bool bright : {false, true}) {
+        test::Scene scene = test::lattice_scene(12, 1.2, bright, 4);
+        scene.light = {.skin = bright ? 50.0 : 150.0,
+                       .gradient = 0.0,
+                       .vignetting = 0.0,
+                       .texture = 0.0,
+                       .read_noise = 0.5,
+                       .shot_noise = 0.0};
+        for (test::SceneDot& dot : scene.dots) dot.paint = bright ? 3.0 : 0.2;
+        const test::Picture picture = test::render(scene);
+        detector->reset();
+        detect(picture);
+        EXPECT_NEAR(report.brightest_level, 150.0, 6.0) << bright;
+        EXPECT_NEAR(report.faintest_contrast, bright ? 97.0 : 117.0, 8.0) << bright;
+    }
+    detect(grey(64, 64, 100));
+    EXPECT_EQ(report.brightest_level, 0.0);
+    EXPECT_EQ(report.faintest_contrast, 0.0);
+}
+
 TEST_F(DetectorTest, ExposureFlagsFollowTheCatalogue) {
     const auto flagged = [&](ExposureFlag flag) {
         return (report.exposure & static_cast<std::uint8_t>(flag)) != 0;
