@@ -19,6 +19,8 @@ std::span<const Experiment> all_experiments() {
         Experiment{"hybrid16-barycentric",
                    "Hybrid16 section 6: barycentric optimisation of markers placed roughly",
                    hybrid16_barycentric},
+        Experiment{"identity-bootstrap", "Names from nothing at any pose within range, 1,000 random starts",
+                   identity_bootstrap},
         Experiment{"missing-markers", "Zhang06 section 10: where unseen markers are inferred to be",
                    missing_markers},
         Experiment{"rbf-dimensions", "Deng06 section 8: how many components, in the take and across takes",
