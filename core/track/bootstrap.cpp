@@ -16,6 +16,7 @@ struct Round {
 constexpr std::array<Round, 6> kRounds{
     {{12.0, 0.6}, {10.0, 0.8}, {8.0, 1.0}, {6.0, 1.5}, {4.5, 2.0}, {3.0, 2.0}}};
 constexpr double kTicksOfPatience = 6.0;
+constexpr double kUsualGhosts = 3.0;  // false dots in a view
 constexpr double kGapLimitMm = 2.0;
 constexpr double kLeastStepRad = 0.14;  // 8 degrees, of the rotations that are voted for
 
@@ -63,6 +64,7 @@ void run_rounds(const ShapeModel& model, const BootstrapConfig& config, const Sh
         combine_views(predicted(model, w), sightings, kGapLimitMm, w.matches, w.named);
         fill_fit_input(model, round.gate_mm, w);
         prior.coefficient_sigma = round.coefficient_sigma;
+        if (round.coefficient_sigma > 1.0) prior.coefficients.fill(0.0);  // near enough: the mean draws again
         const ShapeFit before = w.trial;
         fit_shape(model, {w.positions_mm.data(), model.marker_count},
                   {w.informations.data(), model.marker_count}, prior, 2, before, w.fit, w.trial);
@@ -212,6 +214,8 @@ BootstrapReport judge(const ShapeModel& model, const BootstrapConfig& config, do
     }
     report.explained = total == 0 ? 0.0 : static_cast<double>(named) / static_cast<double>(total);
     report.residual_mm = report.seen == 0 ? 0.0 : std::sqrt(sum / report.seen);
+    for (std::size_t j = 0; j < model.mode_count; ++j)
+        report.expression += w.trial.coefficients[j] * w.trial.coefficients[j];
     report.found = w.trial.ok && report.seen >= kMinMarkers &&
                    report.seen >= config.accept_seen * static_cast<double>(model.marker_count) &&
                    report.explained >= wanted_explained &&
@@ -219,20 +223,27 @@ BootstrapReport judge(const ShapeModel& model, const BootstrapConfig& config, do
     return report;
 }
 
-// Fewer sightings left over first, then the smaller residual.
+// Fewer sightings left over first, then the smaller residual and the likelier expression.
 bool better(const BootstrapReport& a, const BootstrapReport& b) {
     if (a.found != b.found) return a.found;
-    const double score_a = a.explained - 0.1 * a.residual_mm;
-    const double score_b = b.explained - 0.1 * b.residual_mm;
+    const double score_a = a.explained - 0.1 * a.residual_mm - 0.0005 * a.expression;
+    const double score_b = b.explained - 0.1 * b.residual_mm - 0.0005 * b.expression;
     return score_a > score_b;
 }
 
 // A face that explains nearly everything is believed at once; one that explains less only when some ticks of
 // search have found no better.
-double wanted_explained(const BootstrapConfig& config, const BootstrapState& state) {
+double wanted_explained(const BootstrapConfig& config, const SightingSet& sightings,
+                        const BootstrapState& state) {
     const double patience = 1.0 - static_cast<double>(state.ticks) / kTicksOfPatience;
-    return config.accept_explained +
-           std::max(0.0, patience) * (config.accept_explained_at_once - config.accept_explained);
+    double total = 0.0;
+    for (std::size_t view = 0; view < sightings.view_count; ++view)
+        total += static_cast<double>(sightings.views[view].size());
+    // A few false dots are usual, however few true ones there are.
+    const double usual = 1.0 - kUsualGhosts * sightings.view_count / std::max(total, 1.0);
+    const double at_once = std::min(config.accept_explained_at_once, usual);
+    return std::max(config.accept_explained,
+                    config.accept_explained + patience * (at_once - config.accept_explained));
 }
 
 }  // namespace
@@ -241,7 +252,7 @@ BootstrapReport bootstrap(const ShapeModel& model, const BootstrapConfig& config
                           const SightingSet& sightings, BootstrapState& state, BootstrapWorkspace& workspace,
                           ShapeFit& fit) {
     BootstrapReport best;
-    const double wanted = wanted_explained(config, state);
+    const double wanted = wanted_explained(config, sightings, state);
     find_starts(model, config, nominal, sightings, workspace);
     const std::size_t count = workspace.starts.size();
     for (int i = 0; i < config.starts_per_frame && count > 0; ++i) {

@@ -56,6 +56,7 @@ struct BootstrapReport {
     std::uint16_t seen = 0;
     double explained = 0.0;  // share of the sightings that got a name
     double residual_mm = 0.0;
+    double expression = 0.0;  // summed squares of the modes' coefficients
 };
 
 // On success `fit` is the pose and expression behind the best naming. `nominal` is headset_from_face of a
