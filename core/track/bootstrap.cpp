@@ -23,7 +23,7 @@ constexpr double kLeastStepRad = 0.14;  // 8 degrees, of the rotations that are 
 // Approach to a start before names are sought: nearest sightings, the face's leading modes.
 constexpr std::size_t kCoarseModes = 6;
 constexpr std::array<double, 5> kApproachGatesMm{16.0, 12.0, 9.0, 7.0, 6.0};
-constexpr double kSameStartMm = 2.0;     // starts nearer to each other than this are one
+constexpr double kSameStartMm = 2.0;  // starts nearer to each other than this are one
 constexpr std::size_t kPosesWithExpressions = 3;
 constexpr std::size_t kModesWithExpressions = 2;  // a wide open jaw is one; to either side
 constexpr double kExpression = 4.0;               // standard deviations of the mode
@@ -218,8 +218,7 @@ BootstrapReport judge(const ShapeModel& model, const BootstrapConfig& config, do
         report.expression += w.trial.coefficients[j] * w.trial.coefficients[j];
     report.found = w.trial.ok && report.seen >= kMinMarkers &&
                    report.seen >= config.accept_seen * static_cast<double>(model.marker_count) &&
-                   report.explained >= wanted_explained &&
-                   report.residual_mm <= config.accept_residual_mm;
+                   report.explained >= wanted_explained && report.residual_mm <= config.accept_residual_mm;
     return report;
 }
 

@@ -151,7 +151,7 @@ void keep(const PoseCandidate& candidate, Candidates& candidates) {
 struct Search {
     const ShapeModel& model;
     Grid grid;
-    Vec3 centre_mm;          // of the mean face, face frame
+    Vec3 centre_mm;  // of the mean face, face frame
     double depth_step_mm = 0.0;
     std::size_t depths = 1;
 };

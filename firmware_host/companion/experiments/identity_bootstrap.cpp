@@ -34,13 +34,13 @@ constexpr std::array kCases{
 };
 
 struct StartFigures {
-    std::size_t right = 0;   // starts whose every visible marker has its name in the tenth frame
-    std::size_t found = 0;   // ... that track at all
-    std::size_t wrong = 0;   // ... with a wrong name among them
+    std::size_t right = 0;  // starts whose every visible marker has its name in the tenth frame
+    std::size_t found = 0;  // ... that track at all
+    std::size_t wrong = 0;  // ... with a wrong name among them
     std::size_t slowest_frames = 0;
-    double slowest_ms = 0.0;  // of one tick, processor time
+    double slowest_ms = 0.0;            // of one tick, processor time
     std::vector<std::uint64_t> missed;  // seeds
-    IdentityFigures after;  // from the tenth frame on
+    IdentityFigures after;              // from the tenth frame on
 };
 
 double cpu_ms() {
@@ -53,7 +53,8 @@ void run_start(const IdentityScene& scene, const StartCase& start, std::uint64_t
     const Take& take = start.speech ? scene.head.speech : scene.head.range_of_motion;
     const auto first = static_cast<std::size_t>(
         random.uniform() * static_cast<double>(take.frame_count - kFramesFollowed - kFramesToStart));
-    const Rigid pose = random_pose(start.rotation_deg * std::numbers::pi / 180.0, start.translation_mm, random);
+    const Rigid pose =
+        random_pose(start.rotation_deg * std::numbers::pi / 180.0, start.translation_mm, random);
     SightingSource source(scene, {.dropout = 0.05, .ghosts_per_frame = 0.6, .cameras = start.cameras},
                           kFramesFollowed, seed);
     run.restart();
@@ -91,28 +92,29 @@ Result<ExperimentTable, FileError> identity_bootstrap(const std::filesystem::pat
     if (!loaded) return failure(loaded.error());
     const IdentityScene& scene = **loaded;
     ExperimentTable out;
-    out.columns = {"starts", "pose within", "seeds", "right", "found", "with a wrong name",
-                   "slowest, frames", "visible named right", "ghosts taken", "longest wrong, frames",
-                   "converged wrong", "slowest tick, ms", "seeds missed"};
+    out.columns = {"starts",       "pose within",           "seeds",           "right",
+                   "found",        "with a wrong name",     "slowest, frames", "visible named right",
+                   "ghosts taken", "longest wrong, frames", "converged wrong", "slowest tick, ms",
+                   "seeds missed"};
     for (const StartCase& start : kCases) {
         IdentityRun run(scene.view);
         StartFigures figures;
         for (std::uint64_t i = 0; i < kStarts; ++i) run_start(scene, start, start.seed + i, run, figures);
         figures.after = run.figures();
-        out.rows.push_back({start.name, fmt::format("{} deg, {} mm", start.rotation_deg, start.translation_mm),
-                            fmt::format("{}..{}", start.seed, start.seed + kStarts - 1),
-                            fmt::format("{}", figures.right), fmt::format("{}", figures.found),
-                            fmt::format("{}", figures.wrong), fmt::format("{}", figures.slowest_frames),
-                            fmt::format("{:.5f}", figures.after.right_share()),
-                            fmt::format("{} of {}", figures.after.ghosts_taken, figures.after.ghosts),
-                            fmt::format("{}", figures.after.longest_wrong_frames),
-                            fmt::format("{}", figures.after.converged_wrong),
-                            fmt::format("{:.1f}", figures.slowest_ms), listed(figures.missed)});
+        out.rows.push_back(
+            {start.name, fmt::format("{} deg, {} mm", start.rotation_deg, start.translation_mm),
+             fmt::format("{}..{}", start.seed, start.seed + kStarts - 1), fmt::format("{}", figures.right),
+             fmt::format("{}", figures.found), fmt::format("{}", figures.wrong),
+             fmt::format("{}", figures.slowest_frames), fmt::format("{:.5f}", figures.after.right_share()),
+             fmt::format("{} of {}", figures.after.ghosts_taken, figures.after.ghosts),
+             fmt::format("{}", figures.after.longest_wrong_frames),
+             fmt::format("{}", figures.after.converged_wrong), fmt::format("{:.1f}", figures.slowest_ms),
+             listed(figures.missed)});
         const std::string name = start.name;
         out.bounds.push_back({name + ": share of starts not right within 10 frames",
                               1.0 - static_cast<double>(figures.right) / kStarts, 0.001});
-        out.bounds.push_back({name + ": markers converged wrong",
-                              static_cast<double>(figures.after.converged_wrong), 0.0});
+        out.bounds.push_back(
+            {name + ": markers converged wrong", static_cast<double>(figures.after.converged_wrong), 0.0});
     }
     return out;
 }

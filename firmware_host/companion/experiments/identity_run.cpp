@@ -91,6 +91,18 @@ void IdentityRun::count_runs(std::size_t view) {
     }
 }
 
+void IdentityRun::check(std::span<const Vec3> labelled_mm) {
+    check_names(*model_, config_, labelled_mm, static_cast<double>(pack_.noise_mm), *state_, *workspace_,
+                *sightings_, *named_, *report_);
+}
+
+void IdentityRun::exchange_memories(std::size_t a, std::size_t b) {
+    std::swap(state_->position_mm[a], state_->position_mm[b]);
+    std::swap(state_->velocity_mm[a], state_->velocity_mm[b]);
+    std::swap(state_->bias_mm[a], state_->bias_mm[b]);
+    std::swap(state_->missed[a], state_->missed[b]);
+}
+
 IdentityFigures IdentityRun::track(bool count) {
     rig::track(*model_, config_, *sightings_, *state_, *workspace_, *named_, *report_);
     IdentityFigures frame;

@@ -46,6 +46,11 @@ class IdentityRun {
     // ends with a frame in which the name is right, free, or not counted.
     IdentityFigures track(bool count = true);
 
+    // A labelled frame instead: entry k claims to be marker k. Nothing is counted.
+    void check(std::span<const Vec3> labelled_mm);
+    // What the tracker remembers of two markers changes places.
+    void exchange_memories(std::size_t a, std::size_t b);
+
     [[nodiscard]] const IdentityFigures& figures() const { return figures_; }
     [[nodiscard]] const TrackerReport& report() const { return *report_; }
     [[nodiscard]] const NamedMarkers& named() const { return *named_; }

@@ -85,12 +85,24 @@ std::vector<Vec3> face_markers(const MarkerModel& model, const Take& take, std::
     return out;
 }
 
+std::size_t nearest_neighbour(const MarkerLayout& layout, std::size_t marker) {
+    const Vec3 from = vector_of(layout.markers[marker].neutral_mm);
+    std::size_t nearest = marker == 0 ? 1 : 0;
+    for (std::size_t k = 0; k < layout.markers.size(); ++k) {
+        if (k == marker) continue;
+        const double gap = (vector_of(layout.markers[k].neutral_mm) - from).norm();
+        if (gap < (vector_of(layout.markers[nearest].neutral_mm) - from).norm()) nearest = k;
+    }
+    return nearest;
+}
+
 SightingSource::SightingSource(const IdentityScene& scene, const SightingOptions& options, std::size_t frames,
                                std::uint64_t seed)
     : scene_(scene), options_(options), random_(seed) {
     const std::size_t views = options.cameras ? scene.helmet.size() : 1;
     for (std::size_t v = 0; v < views; ++v)
-        masks_.push_back(burst_dropout(scene.head.layout, frames + kRunUpFrames, options.dropout, 16 * seed + v));
+        masks_.push_back(
+            burst_dropout(scene.head.layout, frames + kRunUpFrames, options.dropout, 16 * seed + v));
 }
 
 std::size_t SightingSource::ghost_count() {
@@ -117,7 +129,8 @@ void SightingSource::add_cloud(std::size_t at, std::span<const Vec3> markers_mm,
     std::vector<int> truth;
     for (std::size_t k = 0; k < markers_mm.size(); ++k) {
         if (masks_[0].at(at + kRunUpFrames, k)) continue;
-        points.push_back(markers_mm[k] + options_.noise_mm * Vec3{random_.next(), random_.next(), random_.next()});
+        points.push_back(markers_mm[k] +
+                         options_.noise_mm * Vec3{random_.next(), random_.next(), random_.next()});
         truth.push_back(static_cast<int>(k));
     }
     // Where the ghosts of unlabelled.npy are: within 15 mm of the box around the face.

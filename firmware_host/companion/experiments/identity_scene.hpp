@@ -34,7 +34,7 @@ struct IdentityScene {
 [[nodiscard]] Rigid random_pose(double rotation_rad, double translation_mm, WhiteNoise& random);
 
 struct SightingOptions {
-    double dropout = 0.05;         // of each marker in each view, in bursts of 4 to 30 frames
+    double dropout = 0.05;          // of each marker in each view, in bursts of 4 to 30 frames
     double ghosts_per_frame = 0.6;  // in each view
     double noise_mm = 0.1;
     double noise_px = 0.1;
@@ -65,5 +65,8 @@ class SightingSource {
 
 // neutral + B w of one frame of a take, face frame.
 [[nodiscard]] std::vector<Vec3> face_markers(const MarkerModel& model, const Take& take, std::size_t frame);
+
+// On the neutral face.
+[[nodiscard]] std::size_t nearest_neighbour(const MarkerLayout& layout, std::size_t marker);
 
 }  // namespace rig::host
