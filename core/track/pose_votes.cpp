@@ -50,8 +50,8 @@ Vec3 viewing_direction(const SightingSet& sightings) {
 }
 
 void span_across(const Vec3& along, Grid& grid) {
-    const Vec3 helper = std::abs(along[0]) < 0.7 ? Vec3{Vec3::UnitX()} : Vec3{Vec3::UnitY()};
-    Vec3 u = helper - helper.dot(along) * along;
+    const Vec3 crosswise = std::abs(along[0]) < 0.7 ? Vec3{Vec3::UnitX()} : Vec3{Vec3::UnitY()};
+    Vec3 u = crosswise - crosswise.dot(along) * along;
     u /= std::sqrt(u.dot(u));
     grid.across = {u, along.cross(u), along};
 }
