@@ -15,9 +15,8 @@ struct Round {
 };
 constexpr std::array<Round, 6> kRounds{
     {{12.0, 0.6}, {10.0, 0.8}, {8.0, 1.0}, {6.0, 1.5}, {4.5, 2.0}, {3.0, 2.0}}};
-constexpr std::uint16_t kTicksOfPatience = 6;  // long enough to try every start
-constexpr double kUsualFalseDots = 3.0;        // in a view
-constexpr double kUsualGhosts = 1.0;           // in a cloud
+constexpr double kTicksOfPatience = 6.0;
+constexpr double kUsualGhosts = 3.0;  // false dots in a view
 constexpr double kGapLimitMm = 2.0;
 constexpr double kLeastStepRad = 0.14;  // 8 degrees, of the rotations that are voted for
 
@@ -235,13 +234,15 @@ bool better(const BootstrapReport& a, const BootstrapReport& b) {
 // search have found no better.
 double wanted_explained(const BootstrapConfig& config, const SightingSet& sightings,
                         const BootstrapState& state) {
-    if (state.ticks >= kTicksOfPatience) return config.accept_explained;
+    const double patience = 1.0 - static_cast<double>(state.ticks) / kTicksOfPatience;
     double total = 0.0;
     for (std::size_t view = 0; view < sightings.view_count; ++view)
         total += static_cast<double>(sightings.views[view].size());
-    // However few true ones there are; more of them in pictures than in a cloud that a system has cleaned.
-    const double usual = sightings.from_cameras ? kUsualFalseDots * sightings.view_count : kUsualGhosts;
-    return std::max(config.accept_explained, 1.0 - (usual + 0.5) / std::max(total, 1.0));
+    // A few false dots are usual, however few true ones there are.
+    const double usual = 1.0 - kUsualGhosts * sightings.view_count / std::max(total, 1.0);
+    const double at_once = std::min(config.accept_explained_at_once, usual);
+    return std::max(config.accept_explained,
+                    config.accept_explained + patience * (at_once - config.accept_explained));
 }
 
 }  // namespace
@@ -260,8 +261,8 @@ BootstrapReport bootstrap(const ShapeModel& model, const BootstrapConfig& config
             best = report;
             fit = workspace.trial;
         }
-        const bool beyond_doubt =
-            best.explained >= wanted && best.residual_mm <= 0.5 * config.accept_residual_mm;
+        const bool beyond_doubt = best.explained >= config.accept_explained_at_once &&
+                                  best.residual_mm <= 0.5 * config.accept_residual_mm;
         if (best.found && beyond_doubt) break;
     }
     state.ticks = static_cast<std::uint16_t>(std::min(state.ticks + 1, 60000));

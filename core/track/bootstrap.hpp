@@ -19,10 +19,10 @@ struct BootstrapConfig {
     double rotation_sigma_rad = 0.15;  // about the pose a start begins with
     double translation_sigma_mm = 12.0;
     int starts_per_frame = 3;  // bounds the work of a tick; the next tick goes on with the next starts
-    // Of the sightings, when some ticks of search found none that leaves only the usual false ones over.
-    double accept_explained = 0.85;
-    double accept_seen = 0.5;         // of the markers
-    double accept_residual_mm = 1.2;  // rms after the last round
+    double accept_explained_at_once = 0.96;  // of the sightings
+    double accept_explained = 0.85;          // ... when several ticks of search found no better
+    double accept_seen = 0.5;                // of the markers
+    double accept_residual_mm = 1.2;         // rms after the last round
 };
 
 struct BootstrapState {
