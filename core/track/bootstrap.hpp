@@ -7,26 +7,42 @@
 
 #include "core/geometry/shape_model.hpp"
 #include "core/track/matching.hpp"
+#include "core/track/pose_votes.hpp"
 
 namespace rig {
 
 struct BootstrapConfig {
-    double start_spacing_mm = 7.0;     // starts form a grid of this spacing around the nominal pose
-    double rotation_sigma_rad = 0.15;  // expected helmet slip about the nominal pose
+    // Where the face is looked for, about the nominal pose and the rig's origin.
+    double point_rotation_range_rad = 0.436;   // 25 degrees: streams of points
+    double camera_rotation_range_rad = 0.175;  // 10 degrees: a helmet on the head
+    double translation_range_mm = 20.0;
+    double rotation_sigma_rad = 0.15;  // about the pose a start begins with
     double translation_sigma_mm = 12.0;
-    int starts_per_frame = 3;         // bounds the work of a tick; the next tick goes on with the next starts
-    double accept_explained = 0.85;   // of the sightings
-    double accept_seen = 0.5;         // of the markers
-    double accept_residual_mm = 1.2;  // rms after the last round
+    int starts_per_frame = 3;  // bounds the work of a tick; the next tick goes on with the next starts
+    double accept_explained_at_once = 0.96;  // of the sightings
+    double accept_explained = 0.85;          // ... when several ticks of search found no better
+    double accept_seen = 0.5;                // of the markers
+    double accept_residual_mm = 1.2;         // rms after the last round
 };
 
 struct BootstrapState {
     std::uint16_t next_start = 0;
+    std::uint16_t ticks = 0;  // of search
+};
+
+// A face placed roughly, by its leading modes.
+struct BootstrapStart {
+    ShapeFit fit;
+    double score = 0.0;  // of the sightings it explains
 };
 
 struct BootstrapWorkspace {
     MatchingWorkspace matching;
     ShapeFitWorkspace fit;
+    PoseVotesWorkspace votes;
+    BoundedVector<PoseCandidate, kPoseCandidates> candidates;
+    ShapeModel coarse;  // the leading modes alone
+    BoundedVector<BootstrapStart, kPoseCandidates> starts;
     Matches matches{};
     NamedMarkers named;
     ShapeFit trial;
@@ -40,6 +56,7 @@ struct BootstrapReport {
     std::uint16_t seen = 0;
     double explained = 0.0;  // share of the sightings that got a name
     double residual_mm = 0.0;
+    double expression = 0.0;  // summed squares of the modes' coefficients
 };
 
 // On success `fit` is the pose and expression behind the best naming. `nominal` is headset_from_face of a
