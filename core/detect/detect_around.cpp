@@ -12,9 +12,8 @@ namespace rig {
 
 namespace {
 
-constexpr int kLumaRows = 16;                // every so manieth row: windows are to cost less than that
 constexpr double kSurroundingsPx = 8;        // of skin about a marker, for its background and its moat
-constexpr std::size_t kMaxWindowParts = 16;  // that reach into one square; more are noise
+constexpr std::size_t kMaxWindowParts = 48;  // that reach into one square; with more, windows save nothing
 constexpr int kBlock = static_cast<int>(kBlockPx);
 
 // Part of an image, in its pixels; whole blocks of it, so that their means are those of the whole image, and
@@ -64,20 +63,19 @@ bool is_within_reach(double x_px, double y_px, const ExpectedMarker& expected) {
 }
 
 // The square about the expected place; parts of what reaches into it may be the marker.
-void mark_reach(const ExpectedMarker& expected, const ImageView& window, int left, int top, BitRows& rows) {
+void mark_reach(const ExpectedMarker& expected, const Detector::Search& search, BitRows& rows) {
     const double reach = reach_of(expected);
+    const int width = search.right - search.left;
+    const int height = search.bottom - search.top;
     const auto bound = [](double at, int limit) {
         return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(limit)));
     };
-    const double x = static_cast<double>(expected.x_px) - left;
-    const double y = static_cast<double>(expected.y_px) - top;
-    const std::uint64_t span =
-        bit_span(bound(x - reach, window.width_px), bound(x + reach + 1.0, window.width_px));
-    const int last = bound(y + reach + 1.0, window.height_px);
-    std::fill_n(rows.begin(), window.height_px, std::uint64_t{0});
-    for (int row = bound(y - reach, window.height_px); row < last; ++row) {
-        rows[static_cast<std::size_t>(row)] = span;
-    }
+    const double x = static_cast<double>(expected.x_px) - search.left;
+    const double y = static_cast<double>(expected.y_px) - search.top;
+    const std::uint64_t span = bit_span(bound(x - reach, width), bound(x + reach + 1.0, width));
+    const int last = bound(y + reach + 1.0, height);
+    std::fill_n(rows.begin(), height, std::uint64_t{0});
+    for (int row = bound(y - reach, height); row < last; ++row) rows[static_cast<std::size_t>(row)] = span;
 }
 
 // A connected set of bits as a component in pixels of the image; its runs go to `runs`. False: no room.
@@ -104,16 +102,6 @@ bool component_of(const BitRows& rows, int height, int left, int top, std::span<
     return true;
 }
 
-// Whether the window cuts it off: the image goes on there.
-bool is_cut_off(const Component& component, const Detector::Search& search, const ImageView& window) {
-    const int right = search.grid_left + window.width_px;
-    const int bottom = search.grid_top + window.height_px;
-    return (component.left == search.grid_left && search.grid_left > 0) ||
-           (component.top == search.grid_top && search.grid_top > 0) ||
-           (component.right + 1 == right && right < search.image.width_px) ||
-           (component.bottom + 1 == bottom && bottom < search.image.height_px);
-}
-
 bool are_one(const Blob& a, const Blob& b) {
     const double dx = a.x_px - b.x_px;
     const double dy = a.y_px - b.y_px;
@@ -127,12 +115,12 @@ bool is_same(const Component& a, const Component& b) {
 
 }  // namespace
 
-// As detect_side(), of a part of the image.
-void Detector::search_window(const ImageView& image, Side side, const ExpectedMarker& expected,
+// As detect_side(), of a part of the image. False when it holds more parts than are looked at.
+bool Detector::search_window(const ImageView& image, Side side, const ExpectedMarker& expected,
                              SideResult& result) {
     Workspace& w = workspace_;
     const Window window = window_about(image, expected, state_.usual_size_px);
-    if (window.right - window.left < kBlock || window.bottom - window.top < kBlock) return;
+    if (window.right - window.left < kBlock || window.bottom - window.top < kBlock) return true;
     const ImageView part{image.row(window.top) + window.left, window.right - window.left,
                          window.bottom - window.top, image.stride_bytes};
     const BlockGrid means = block_means(part, w.means);
@@ -140,62 +128,84 @@ void Detector::search_window(const ImageView& image, Side side, const ExpectedMa
     const double largest = largest_marker(state_.usual_size_px);
     set_thresholds(means, thresholds, side, largest);
     threshold_bits(part, thresholds, side, w.window);
-    const Search search{image, thresholds, side, largest, window.left, window.top};
+    const Search search{image,       thresholds, side,         largest,
+                        window.left, window.top, window.right, window.bottom};
     const std::size_t before = result.blobs.size();
-    if (!examine_window(search, part, expected, result)) split_failed(search, means, result);
+    const bool counted = examine_window(search, expected, result);
+    const bool found = std::any_of(result.blobs.begin(), result.blobs.end(), [&](const Blob& blob) {
+        return is_within_reach(blob.x_px, blob.y_px, expected);
+    });
+    if (found) drop_cut_off(search);
+    split_failed(search, means, result);
     drop_repeats(before, result);
+    return counted;
 }
 
-// What a window cuts off may have been measured as a part of something else before.
+// What only reaches into the window is left to the window it belongs to, unless the marker may be in it.
+void Detector::drop_cut_off(const Search& search) {
+    Workspace& w = workspace_;
+    std::size_t kept = 0;
+    for (const std::uint16_t c : w.failed) {
+        if (!search.cuts_off(w.components[c])) w.failed[kept++] = c;
+    }
+    w.failed.resize(kept);
+}
+
+// Two windows may both have measured a marker, one of them as a part of something else: the rounder one
+// counts.
 void Detector::drop_repeats(std::size_t first, SideResult& result) {
     std::size_t kept = first;
     for (std::size_t i = first; i < result.blobs.size(); ++i) {
+        const Blob& blob = result.blobs[i];
         const auto before = std::span(result.blobs.span()).first(first);
-        const auto again = [&](const Blob& other) { return are_one(other, result.blobs[i]); };
-        if (std::none_of(before.begin(), before.end(), again)) result.blobs[kept++] = result.blobs[i];
+        const auto same = std::find_if(before.begin(), before.end(),
+                                       [&](const Blob& other) { return are_one(other, blob); });
+        if (same == before.end()) {
+            result.blobs[kept++] = blob;
+        } else if (blob.badness < same->badness) {
+            *same = blob;
+        }
     }
     result.blobs.resize(kept);
 }
 
-// Measures what reaches into the square about the expected place; true when a marker is within reach.
-bool Detector::examine_window(const Search& search, const ImageView& window, const ExpectedMarker& expected,
-                              SideResult& result) {
+// Measures what reaches into the square about the expected place. False when there are too many parts.
+bool Detector::examine_window(const Search& search, const ExpectedMarker& expected, SideResult& result) {
     Workspace& w = workspace_;
-    const auto height = static_cast<std::size_t>(window.height_px);
+    const auto height = static_cast<std::size_t>(search.bottom - search.top);
     w.failed.clear();
-    mark_reach(expected, window, search.grid_left, search.grid_top, w.reach);
+    mark_reach(expected, search, w.reach);
+    std::size_t floods = 0;
     std::size_t parts = 0;
     std::size_t used = 0;
     for (std::size_t y = 0; y < height; ++y) {
-        while ((w.reach[y] & w.window[y]) != 0 && parts < kMaxWindowParts) {
-            const std::uint64_t within = w.reach[y] & w.window[y];
+        for (std::uint64_t within = 0; (within = w.reach[y] & w.window[y]) != 0;) {
+            if (++floods > kMaxWindowParts) return false;
             std::fill_n(w.part.begin(), height, std::uint64_t{0});
             w.part[y] = within & (~within + 1);
-            flood(w.part, w.window, window.height_px);
+            flood(w.part, w.window, static_cast<int>(height));
             for (std::size_t k = 0; k < height; ++k) w.window[k] &= ~w.part[k];
             Component& component = w.components[parts];
             const std::span<Run> room = std::span(w.grouped).subspan(used);
-            if (!component_of(w.part, window.height_px, search.grid_left, search.grid_top, room, component) ||
-                component.area_px < least_area_px(config_.blob)) {
-                continue;
+            if (!component_of(w.part, static_cast<int>(height), search.left, search.top, room, component)) {
+                return false;
             }
+            if (component.area_px < least_area_px(config_.blob)) continue;
             component.first = static_cast<std::uint32_t>(used);
             used += component.count;
-            examine_part(search, window, parts++, result);
+            examine_part(search, parts++, result);
         }
     }
     result.report.runs += static_cast<std::uint32_t>(used);
-    return std::any_of(result.blobs.begin(), result.blobs.end(),
-                       [&](const Blob& blob) { return is_within_reach(blob.x_px, blob.y_px, expected); });
+    return true;
 }
 
-void Detector::examine_part(const Search& search, const ImageView& window, std::size_t number,
-                            SideResult& result) {
+void Detector::examine_part(const Search& search, std::size_t number, SideResult& result) {
     Workspace& w = workspace_;
     const Component& component = w.components[number];
     const auto same = [&](const Component& other) { return is_same(component, other); };
     if (std::any_of(w.examined.begin(), w.examined.end(), same)) return;
-    const bool whole = !is_cut_off(component, search, window);
+    const bool whole = !search.cuts_off(component);
     if (whole && !w.examined.push_back(component)) result.report.blobs_full = true;
     if (!whole || !examine(search, component, members_of(component, w.grouped), {}, result)) {
         result.report.blobs_full |= !w.failed.push_back(static_cast<std::uint16_t>(number));
@@ -211,7 +221,7 @@ bool Detector::search_windows(const ImageView& image, std::span<const ExpectedMa
     result.report = DetectorReport{};
     workspace_.examined.clear();
     for (const ExpectedMarker& marker : expected) {
-        if (is_usable(marker)) search_window(image, side, marker, result);
+        if (is_usable(marker) && !search_window(image, side, marker, result)) return false;
     }
     apply_population(side, result);
     std::size_t sure = 0;

@@ -10,7 +10,6 @@ namespace rig {
 
 namespace {
 
-constexpr int kLumaRows = 4;    // every so manieth row is enough for the mean
 constexpr int kCorePixels = 3;  // beyond one and a half thresholds
 constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
                                                            0.75};  // of a component's own range of grey
@@ -205,7 +204,7 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
         connect(std::span<const Run>(w.runs).first(count), {least_area_px(config_.blob)},
                 {w.parents, w.areas, w.grouped, w.components});
     result.report.blobs_full = counts.dropped > 0;
-    const Search search{image, thresholds, side, largest};
+    const Search search{image, thresholds, side, largest, 0, 0, image.width_px, image.height_px};
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& component = w.components[c];
         if (examine(search, component, members_of(component, w.grouped), {}, result)) continue;
@@ -224,7 +223,8 @@ void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResu
         state_.usual_size_px > 0.0 ? wide.largest_px : largest_marker(usual_size(result.blobs));
     const bool narrower = largest < wide.largest_px;
     if (narrower) set_thresholds(means, wide.thresholds, wide.side, largest);
-    const Search search{wide.image, wide.thresholds, wide.side, largest, wide.grid_left, wide.grid_top};
+    const Search search{wide.image, wide.thresholds, wide.side,  largest,
+                        wide.left,  wide.top,        wide.right, wide.bottom};
     for (const std::uint16_t c : w.failed) {
         const Component& component = w.components[c];
         split(search, narrower ? 0 : 1, component, members_of(component, w.grouped), result);
@@ -281,6 +281,7 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& part = storage.components[c];
         const std::span<const Run> members = members_of(part, storage.grouped);
+        if (search.cuts_off(part)) continue;  // another window sees all of it, or nobody does
         if (!whole && examine(search, part, members, all, result)) continue;
         if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
     }

@@ -79,12 +79,13 @@ void add_counts(DetectorReport& total, const DetectorReport& part);
 inline constexpr float kMaxReachPx =
     24.0F;  // an expected marker farther away than that is searched for in vain
 inline constexpr double kWindowShare = 0.75;
+inline constexpr int kLumaRows = 8;  // every so manieth row is enough for the mean
 
 // How often a blob that is no marker is cut again.
 inline constexpr std::size_t kSplitLevels = 3;
 
 // One camera's detector. Memory is fixed (about 4 MB); detect() never allocates and never fails: hard data
-// give few observations and a report. Observations are in raster order of their first pixel.
+// give few observations and a report. The order of observations says nothing.
 class Detector {
   public:
     // Validates once. On failure the detector keeps its previous configuration.
@@ -95,7 +96,8 @@ class Detector {
 
     // The same, reading only windows around where markers are expected: a tracker's predictions. Looks at the
     // whole image instead (report.whole_image) while polarity and size of the markers are unknown, or when
-    // less than kWindowShare of the expected markers have an observation within their reach.
+    // less than kWindowShare of the expected markers have an observation within their reach or a window holds
+    // more parts than it has room for.
     void detect_around(const ImageView& image, std::span<const ExpectedMarker> expected,
                        Observations& observations, DetectorReport& report);
 
@@ -105,13 +107,21 @@ class Detector {
         const BlockGrid& thresholds;
         Side side;
         double largest_px;  // longest marker
-        int grid_left = 0;  // px: where the thresholds' grid begins
-        int grid_top = 0;
+        int left;           // px: what is looked at, and where the thresholds' grid begins
+        int top;
+        int right;  // exclusive
+        int bottom;
 
         [[nodiscard]] int level(int x, int y) const {
-            return thresholds.values[static_cast<std::size_t>((y - grid_top) / static_cast<int>(kBlockPx) *
-                                                                  thresholds.width +
-                                                              (x - grid_left) / static_cast<int>(kBlockPx))];
+            return thresholds
+                .values[static_cast<std::size_t>((y - top) / static_cast<int>(kBlockPx) * thresholds.width +
+                                                 (x - left) / static_cast<int>(kBlockPx))];
+        }
+        // Whether it goes on where nothing is looked at.
+        [[nodiscard]] bool cuts_off(const Component& component) const {
+            return (component.left == left && left > 0) || (component.top == top && top > 0) ||
+                   (component.right + 1 == right && right < image.width_px) ||
+                   (component.bottom + 1 == bottom && bottom < image.height_px);
         }
     };
 
@@ -168,10 +178,12 @@ class Detector {
     void detect_side(const ImageView& image, const BlockGrid& means, Side side, SideResult& result);
     [[nodiscard]] bool search_windows(const ImageView& image, std::span<const ExpectedMarker> expected,
                                       SideResult& result);
-    void search_window(const ImageView& image, Side side, const ExpectedMarker& expected, SideResult& result);
-    [[nodiscard]] bool examine_window(const Search& search, const ImageView& window,
-                                      const ExpectedMarker& expected, SideResult& result);
-    void examine_part(const Search& search, const ImageView& window, std::size_t number, SideResult& result);
+    [[nodiscard]] bool search_window(const ImageView& image, Side side, const ExpectedMarker& expected,
+                                     SideResult& result);
+    [[nodiscard]] bool examine_window(const Search& search, const ExpectedMarker& expected,
+                                      SideResult& result);
+    void examine_part(const Search& search, std::size_t number, SideResult& result);
+    void drop_cut_off(const Search& search);
     static void drop_repeats(std::size_t first, SideResult& result);
     [[nodiscard]] bool is_settled() const;
     void finish(std::size_t side, Observations& observations, DetectorReport& report);

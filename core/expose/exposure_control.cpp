@@ -78,9 +78,10 @@ void ExposureControl::split(double light) {
     if (config_.mains_hz > 0.0) {
         const double flash_us = 5e5 / config_.mains_hz;
         const auto flashes = static_cast<int>(exposure_us_ / flash_us);
-        if (flashes > 0) exposure_us_ = flashes * flash_us;
+        if (flashes * flash_us >= config_.shortest_us) exposure_us_ = flashes * flash_us;
     }
-    exposure_us_ = std::max(static_cast<double>(static_cast<std::int32_t>(exposure_us_)), 1.0);
+    const auto whole_us = static_cast<double>(static_cast<std::int32_t>(exposure_us_));
+    exposure_us_ = whole_us >= config_.shortest_us ? whole_us : std::min(whole_us + 1.0, longest_us_);
     gain_ = std::clamp(light / exposure_us_, 1.0, most_gain_);
 }
 
@@ -91,15 +92,16 @@ void ExposureControl::gather(const LightReading& r) {
         ++window_.sighted;
         window_.level += r.brightest_level;
         window_.contrast += r.faintest_contrast;
-        window_.saturated = window_.saturated || r.brightest_level >= kSaturatedLevel;
+        window_.saturated += r.brightest_level >= kSaturatedLevel ? 1 : 0;
     }
     window_.luma += in_range(r.mean_luma, 0.0, 255.0) ? r.mean_luma : usual_luma_;
-    if (!sighted && in_range(r.saturated_fraction, kFloodedFraction, 1.0)) window_.saturated = true;
+    if (!sighted && in_range(r.saturated_fraction, kFloodedFraction, 1.0)) ++window_.saturated;
 }
 
 // By how much more light the picture should have.
 double ExposureControl::wanted_ratio(bool sighted) const {
-    if (window_.saturated) return 1.0 / config_.largest_step;  // how far above full scale nobody can say
+    // How far above full scale nobody can say; a single frame is a flash, not the light.
+    if (2 * window_.saturated > window_.frames) return 1.0 / config_.largest_step;
     const double level = sighted ? window_.level / window_.sighted : window_.luma / window_.frames;
     const double target = sighted ? config_.target_level : usual_luma_;
     return (target - config_.black_level) / std::max(kLeastSignal, level - config_.black_level);

@@ -77,7 +77,7 @@ class ExposureControl {
         double level = 0.0;  // sums
         double contrast = 0.0;
         double luma = 0.0;
-        bool saturated = false;  // the level, or without markers the picture
+        int saturated = 0;  // frames whose level, or without markers whose picture, is
     };
 
     void gather(const LightReading& reading);

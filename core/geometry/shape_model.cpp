@@ -55,8 +55,6 @@ Vec3 ShapeModel::face_position(std::size_t marker, std::span<const double> coeff
     return position;
 }
 
-namespace {
-
 void round_modes(ShapeModel& model) {
     model.rows.fill(0.0F);
     model.columns.fill(0.0F);
@@ -71,8 +69,6 @@ void round_modes(ShapeModel& model) {
         }
     }
 }
-
-}  // namespace
 
 void build_shape_model(std::span<const float> neutral_mm, std::span<const float> basis_mm,
                        std::span<const float> prior_mean, std::span<const float> prior_sigma,

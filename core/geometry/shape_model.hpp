@@ -31,6 +31,9 @@ struct ShapeModel {
     [[nodiscard]] Vec3 face_position(std::size_t marker, std::span<const double> coefficients) const;
 };
 
+// Fills rows and columns from modes: whoever writes modes calls it.
+void round_modes(ShapeModel& model);
+
 // Scratch of the function below; large, so it lives with its owner.
 struct ShapeModelWorkspace {
     std::array<double, kMaxShapes * kMaxShapes> gram{};

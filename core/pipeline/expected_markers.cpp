@@ -10,7 +10,7 @@ constexpr double kReachMm = 3.0;         // the largest surprise of a frame that
 constexpr double kReachMmPerMiss = 1.0;  // further, for every frame without the marker,
 constexpr double kMostMm = 8.0;          // up to this
 constexpr double kLeastPx = 3.0;         // the detector's own surprises
-constexpr double kMarkReachPx = 8.0;     // of a mark on the helmet: a camera that was knocked by half a degree
+constexpr double kMarkReachPx = 8.0;  // of a mark on the helmet: a camera that was knocked by half a degree
 
 void expect(const CameraModel& camera, const Vec3& at_mm, double reach_mm, double reach_px, bool surely,
             ExpectedMarkers& expected) {
@@ -30,7 +30,8 @@ void expect_markers(const CameraModel& camera, std::size_t camera_number, const 
     expected.clear();
     for (std::size_t k = 0; k < prediction.position_mm.size(); ++k) {
         const double reach_mm = std::min(kMostMm, kReachMm + kReachMmPerMiss * prediction.missed[k]);
-        expect(camera, prediction.position_mm[k], reach_mm, kLeastPx, prediction.last_match[k] >= 0, expected);
+        expect(camera, prediction.position_mm[k], reach_mm, kLeastPx, prediction.last_match[k] >= 0,
+               expected);
     }
     for (const HelmetMark& mark : marks) {
         if ((mark.cameras >> camera_number & 1U) == 0) continue;

@@ -18,9 +18,9 @@ using ExpectedMarkers = BoundedVector<ExpectedMarker, kMaxMarkers + kMaxReferenc
 
 // What the tracker says of one frame.
 struct MarkerPrediction {
-    std::span<const Vec3> position_mm;            // headset frame, each marker
-    std::span<const std::uint16_t> missed;        // frames since it was last seen by any camera
-    std::span<const std::int16_t> last_match;     // its observation in this camera's last picture; < 0: none
+    std::span<const Vec3> position_mm;         // headset frame, each marker
+    std::span<const std::uint16_t> missed;     // frames since it was last seen by any camera
+    std::span<const std::int16_t> last_match;  // its observation in this camera's last picture; < 0: none
 };
 
 // Markers in front of the camera whose pixel is inside its picture, and the helmet's own marks. A marker

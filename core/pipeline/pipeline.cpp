@@ -12,9 +12,9 @@ namespace rig {
 namespace {
 
 constexpr double kCentreSigmaPx = 0.15;  // of a detected centre: measured on rendered frames, blur and noise
-constexpr double kNominalDepthMm = 200.0;   // helmet camera to face, when the calibration does not tell
+constexpr double kNominalDepthMm = 200.0;       // helmet camera to face, when the calibration does not tell
 constexpr std::uint32_t kWholeImageEvery = 32;  // frames, of each camera
-constexpr std::int64_t kDecayUs = 400'000;  // to the rest pose, policy kDecay
+constexpr std::int64_t kDecayUs = 400'000;      // to the rest pose, policy kDecay
 constexpr float kObservable = 0.5F;    // confidence, everything visible, from which a shape counts as seen
 constexpr float kPartialShare = 0.5F;  // of that confidence, under which its region is not seen any more
 
@@ -129,6 +129,8 @@ void Pipeline::forget_neutral() {
 }
 
 void Pipeline::reset_tracking() {
+    window_ticks_ = 0;
+    stabilised_ = StabiliserOutput{};
     reset_tracker(tracker_);
     reset_stabiliser(stabiliser_);
     reset_solver(solver_);
@@ -167,16 +169,15 @@ void Pipeline::begin(std::int64_t capture_us, FaceState& state, FrameReport& rep
 // so that what was taken for a marker has to be the best in the whole picture.
 void Pipeline::find_markers(std::size_t camera, const ImageView& image) {
     Detector& detector = detectors_[camera];
-    const bool due = (sequence_ + camera * kWholeImageEvery / kMaxCameras) % kWholeImageEvery == 0;
+    const bool due = (window_ticks_ + camera * kWholeImageEvery / kMaxCameras) % kWholeImageEvery == 0;
     if (!tracker_.tracking || due || !config_.windows) {
         if (!tracker_.tracking) detector.forget_size();
         detector.detect(image, observations_[camera], detector_reports_[camera]);
         return;
     }
-    const MarkerPrediction prediction{
-        predict_markers(model_, tracker_config_, tracker_, tracker_workspace_),
-        std::span(tracker_.missed).first(pack_.marker_count),
-        std::span(track_report_.matches[camera]).first(pack_.marker_count)};
+    const MarkerPrediction prediction{predict_markers(model_, tracker_config_, tracker_, tracker_workspace_),
+                                      std::span(tracker_.missed).first(pack_.marker_count),
+                                      std::span(track_report_.matches[camera]).first(pack_.marker_count)};
     expect_markers(turned_camera(pack_.cameras[camera], mounts_[camera].turn_rad), camera, prediction,
                    std::span(pack_.reference_marks).first(pack_.reference_mark_count), expected_);
     detector.detect_around(image, expected_.span(), observations_[camera], detector_reports_[camera]);
@@ -224,6 +225,7 @@ void Pipeline::step(const FrameSet& frame, FaceState& state, FrameReport& report
         state.cameras[c] = status;
         take_observations(c, observations_[c].span(), report);
     }
+    ++window_ticks_;
     if (any) track_sightings(report);
     const bool usable = any && track_report_.tracking;
     if (usable) solve_named(frame.capture_us, report);

@@ -144,6 +144,7 @@ class Pipeline {
     bool sent_any_ = false;  // some solve has been put out
 
     std::uint32_t sequence_ = 0;
+    std::uint32_t window_ticks_ = 0;   // picture frames since tracking began anew
     std::int64_t last_usable_us_ = 0;  // when the silence began that the decay to rest counts from
     std::int64_t sent_us_ = 0;         // capture time of the frame behind sent_
     std::array<double, kMaxShapes> smoothed_{};

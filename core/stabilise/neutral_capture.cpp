@@ -10,6 +10,10 @@ namespace rig {
 
 namespace {
 
+// Of all that is known of a marker, what a direction needs to be learnt along: the rays of one camera turn by
+// some milliradians with the face, which is no knowledge of depth.
+constexpr double kLeastShare = 1e-3;
+
 Vec3 neutral_of(std::span<const float> neutral_mm, std::size_t k) {
     return {static_cast<double>(neutral_mm[3 * k]), static_cast<double>(neutral_mm[3 * k + 1]),
             static_cast<double>(neutral_mm[3 * k + 2])};
@@ -42,7 +46,7 @@ Vec3 mean_offset(const NeutralState& state, std::size_t k) {
     const Mat3& information = state.information[k];
     const double trust = information.trace();
     if (!(trust > 0.0)) return Vec3::Zero();
-    const Mat3 held = information + 1e-6 * trust * Mat3::Identity();
+    const Mat3 held = information + kLeastShare * trust * Mat3::Identity();
     return inverse_3x3(held) * state.weighted[k];
 }
 
@@ -118,7 +122,7 @@ void finish(const ShapeModel& model, const NeutralConfig& config, NeutralState& 
         sum += squared;
         largest.look(std::sqrt(squared), k);
     }
-    if (!(largest.value <= config.most_offset_mm)) {
+    if (!(largest.value <= config.most_offset_mm) || !std::isfinite(sum)) {
         refuse(NeutralRefusal::kOffset, largest, report);
         return;
     }

@@ -82,6 +82,7 @@ void take_leading_modes(const ShapeModel& model, ShapeModel& coarse) {
         for (std::size_t j = 0; j < coarse.mode_count; ++j)
             coarse.modes[k * coarse.mode_count + j] = model.modes[k * model.mode_count + j];
     }
+    round_modes(coarse);
 }
 
 // The nearest sighting of each marker in each view, several markers to one allowed; and how well the markers

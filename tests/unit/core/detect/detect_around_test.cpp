@@ -2,6 +2,7 @@
 // do not serve.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -128,6 +129,62 @@ TEST_F(DetectAroundTest, MarkersThatNeedNotBeThereAreNotMissed) {
     for (std::size_t i = 0; i < 2 * there; ++i) expected.push_back({5.0F, 5.0F, 2.0F, false});
     look(expected);
     EXPECT_FALSE(report.whole_image);
+}
+
+// Dots far apart, so that sizes are known, and what each test adds.
+test::Scene sparse_scene() {
+    test::Scene scene;
+    scene.width_px = 640;
+    scene.height_px = 560;
+    scene.light = {.skin = 140.0, .gradient = 0.0, .vignetting = 0.0, .texture = 0.0};
+    for (int i = 0; i < 24; ++i) scene.dots.push_back({60.0 + 100.0 * (i % 6), 60.0 + 80.0 * (i / 6)});
+    return scene;
+}
+
+TEST_F(DetectAroundTest, TouchingMarkersAreCutWhicheverWindowComesFirst) {
+    configure(MarkerPolarity::kDark);
+    test::Scene scene = sparse_scene();
+    for (const double x : {200.0, 217.0, 227.5}) scene.dots.push_back({x, 500.0});
+    show(scene);
+    detector->detect(picture.view(), whole, report);
+    std::vector<ExpectedMarker> expected = expect(scene, 0.0F, 14.0F, 1);
+    for (int order = 0; order < 2; ++order) {
+        look(expected);
+        EXPECT_FALSE(report.whole_image);
+        EXPECT_EQ(around.size(), whole.size()) << "order " << order;
+        std::reverse(expected.begin(), expected.end());
+    }
+}
+
+TEST_F(DetectAroundTest, AnEmptyWindowBesideAMarkerDoesNotSpoilIt) {
+    configure(MarkerPolarity::kDark);
+    for (const double dx : {-29.0, -28.0, -27.0, -25.0, 25.0, 28.0, 29.0}) {
+        test::Scene scene = sparse_scene();
+        scene.dots.push_back({300.0 + dx, 500.0, 12.0, 12.0});
+        show(scene);
+        detector->detect(picture.view(), whole, report);
+        std::vector<ExpectedMarker> expected = expect(scene, 0.0F, 6.0F, 1);
+        expected.insert(expected.begin(), {300.0F, 500.0F, 24.0F, false});
+        look(expected);
+        ASSERT_FALSE(report.whole_image);
+        const auto counts = test::match(truth_of(scene), test::seen_dots(around));
+        EXPECT_EQ(counts.expected_found, scene.dots.size()) << dx;
+        EXPECT_LT(counts.largest_error_px, 0.3) << dx;
+    }
+}
+
+TEST_F(DetectAroundTest, AWindowFullOfCrumbsIsLeftToTheWholeImage) {
+    configure(MarkerPolarity::kDark);
+    const test::Scene scene = sparse_scene();
+    show(scene);
+    for (std::size_t y = 480; y < 540; y += 2) {
+        for (std::size_t x = 280; x < 340; x += 2) picture.pixels[y * 640 + x] = 0;
+    }
+    std::vector<ExpectedMarker> expected = expect(scene, 0.0F, 6.0F, 1);
+    expected.push_back({310.0F, 510.0F, 24.0F, false});
+    look(expected);
+    EXPECT_TRUE(report.whole_image);
+    EXPECT_GE(around.size(), scene.dots.size());
 }
 
 TEST_F(DetectAroundTest, PredictionsMayBeAnything) {

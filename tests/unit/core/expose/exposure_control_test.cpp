@@ -161,7 +161,21 @@ TEST(ExposureControl, AFlashIsNoLight) {
     for (int frame = 0; frame < 60; ++frame) {
         LightReading reading = markers_at(165.0);
         if (frame % 20 == 10) reading = {.mean_luma = 40.0};  // a frame in which nothing was found
+        if (frame == 15 || frame == 37) reading = markers_at(250.0);
         EXPECT_FALSE(c.step(reading).changed) << frame;
+    }
+}
+
+TEST(ExposureControl, StaysInARangeThatMainsAndWholeMicrosecondsMiss) {
+    for (const double shortest_us : {20.7, 9000.0}) {
+        ExposureConfig config;
+        config.shortest_us = config.start_exposure_us = shortest_us;
+        config.longest_us = config.blur_limit_us = 16000.0;
+        config.mains_hz = 60.0;
+        ExposureControl c = control(config);
+        for (int frame = 0; frame < 40; ++frame) {
+            EXPECT_GE(c.step(markers_at(frame < 20 ? 252.0 : 100.0)).exposure_us, shortest_us) << frame;
+        }
     }
 }
 

@@ -187,7 +187,8 @@ TEST(Matching, GroupsFindTheOptimumOfAllPairs) {
             const auto& seen = s.sightings->views[view];
             std::vector<double> cost;
             for (std::size_t k = 0; k < predicted.size(); ++k) {
-                for (const Sighting& sighting : seen) cost.push_back(cost_at_row(predicted, velocity, k, sighting));
+                for (const Sighting& sighting : seen)
+                    cost.push_back(cost_at_row(predicted, velocity, k, sighting));
             }
             AssignmentProblem problem{predicted.size(), seen.size(), cost, gate_mm * gate_mm};
             std::vector<std::int16_t> best(predicted.size());
