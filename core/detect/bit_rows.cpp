@@ -64,7 +64,7 @@ void flood(BitRows& seed, const BitRows& allowed, int height) {
 void fill_holes(BitRows& rows, int width, int height) {
     std::uint64_t split = 0;  // rows that are one run each have none
     for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
-        split |= rows[y] & (rows[y] + (rows[y] & (~rows[y] + 1)));
+        split |= beyond_first_run(rows[y]);
     }
     if (split == 0) return;
     const std::uint64_t mask = row_mask(width);

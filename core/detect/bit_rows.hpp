@@ -32,6 +32,11 @@ using BitRows = std::array<std::uint64_t, kBlobWindowPx>;
     return static_cast<int>((bits * 0x0101010101010101ULL) >> 56);
 }
 
+// Bits beyond the first run of a row; 0 for a row that is one run, or empty.
+[[nodiscard]] inline std::uint64_t beyond_first_run(std::uint64_t row) {
+    return row & (row + (row & (~row + 1)));
+}
+
 [[nodiscard]] int count_bits(const BitRows& rows, int height);
 
 // One step into the four (eight) neighbours.

@@ -31,6 +31,7 @@ inline constexpr double kDeepOutline = 0.6875;
 inline constexpr double kOpenCover = 0.4375;
 inline constexpr double kSoftRamp =
     0.25;  // weights rise from 0 to 1 from this much before an outline to after it
+inline constexpr double kHiddenCover = 0.4;   // beyond the skin, the other way: neither paint nor skin
 inline constexpr double kDeepBadness = 0.25;  // of a marker that only shows at the deep outline
 
 // Refused for what shadow does to an outline: worth another look at the deep one.

@@ -52,13 +52,6 @@ void unite_rows(const Run* runs, std::uint32_t total, std::uint32_t* parents) {
     }
 }
 
-void widen(Component& component, const Run& run) {
-    component.left = std::min(component.left, run.begin);
-    component.right = std::max(component.right, static_cast<std::uint16_t>(run.end - 1));
-    component.bottom = run.y;
-    ++component.count;
-}
-
 // A new component's, or kNone.
 std::uint32_t number_of(const Run& first, std::uint32_t area_px, const ComponentLimits& limits,
                         std::span<Component> components, ComponentCounts& counts) {

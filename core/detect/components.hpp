@@ -1,6 +1,7 @@
 // Connected components of runs: union-find of fixed capacity, eight-connected. Not for: pixels or shapes.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -23,6 +24,14 @@ struct Component {
 [[nodiscard]] inline std::span<const Run> members_of(const Component& component,
                                                      std::span<const Run> grouped) {
     return grouped.subspan(component.first, component.count);
+}
+
+// Bounds and count of a component with one more run; runs come in raster order.
+inline void widen(Component& component, const Run& run) {
+    component.left = std::min(component.left, run.begin);
+    component.right = std::max(component.right, static_cast<std::uint16_t>(run.end - 1));
+    component.bottom = run.y;
+    ++component.count;
 }
 
 struct ComponentLimits {

@@ -25,6 +25,10 @@ struct Window {
     int bottom = 0;
 };
 
+int clamped(double at, int limit) {
+    return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(limit)));
+}
+
 double reach_of(const ExpectedMarker& expected) {
     return static_cast<double>(std::min(expected.reach_px, kMaxReachPx));
 }
@@ -34,17 +38,14 @@ Window window_about(const ImageView& image, const ExpectedMarker& expected, doub
         std::min(0.5 * kBlobWindowPx - kBlock, 0.5 * size_px + reach_of(expected) + kSurroundingsPx);
     const auto x = static_cast<double>(expected.x_px);
     const auto y = static_cast<double>(expected.y_px);
-    const auto bound = [](double at, int limit) {
-        return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(limit)));
-    };
     const auto whole = [](int length, int unit) {
         return std::min((length + unit - 1) / unit * unit, static_cast<int>(kBlobWindowPx));
     };
     Window window;
-    window.left = bound(x - half, image.width_px) / kBlock * kBlock;
-    window.top = bound(y - half, image.height_px) / kBlock * kBlock;
-    window.right = window.left + whole(bound(x + half + 1.0, image.width_px) - window.left, kByteLanes);
-    window.bottom = window.top + whole(bound(y + half + 1.0, image.height_px) - window.top, kBlock);
+    window.left = clamped(x - half, image.width_px) / kBlock * kBlock;
+    window.top = clamped(y - half, image.height_px) / kBlock * kBlock;
+    window.right = window.left + whole(clamped(x + half + 1.0, image.width_px) - window.left, kByteLanes);
+    window.bottom = window.top + whole(clamped(y + half + 1.0, image.height_px) - window.top, kBlock);
     window.right = std::min(window.right, image.width_px);
     window.bottom = std::min(window.bottom, image.height_px);
     return window;
@@ -67,15 +68,12 @@ void mark_reach(const ExpectedMarker& expected, const Detector::Search& search, 
     const double reach = reach_of(expected);
     const int width = search.right - search.left;
     const int height = search.bottom - search.top;
-    const auto bound = [](double at, int limit) {
-        return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(limit)));
-    };
     const double x = static_cast<double>(expected.x_px) - search.left;
     const double y = static_cast<double>(expected.y_px) - search.top;
-    const std::uint64_t span = bit_span(bound(x - reach, width), bound(x + reach + 1.0, width));
-    const int last = bound(y + reach + 1.0, height);
+    const std::uint64_t span = bit_span(clamped(x - reach, width), clamped(x + reach + 1.0, width));
+    const int last = clamped(y + reach + 1.0, height);
     std::fill_n(rows.begin(), height, std::uint64_t{0});
-    for (int row = bound(y - reach, height); row < last; ++row) rows[static_cast<std::size_t>(row)] = span;
+    for (int row = clamped(y - reach, height); row < last; ++row) rows[static_cast<std::size_t>(row)] = span;
 }
 
 // A connected set of bits as a component in pixels of the image; its runs go to `runs`. False: no room.
@@ -92,11 +90,9 @@ bool component_of(const BitRows& rows, int height, int left, int top, std::span<
             const Run run{static_cast<std::uint16_t>(top + y), static_cast<std::uint16_t>(left + begin),
                           static_cast<std::uint16_t>(left + end)};
             if (component.count == 0) component.top = run.y;
-            runs[component.count++] = run;
+            runs[component.count] = run;
             component.area_px += static_cast<std::uint32_t>(end - begin);
-            component.left = std::min(component.left, run.begin);
-            component.right = std::max(component.right, static_cast<std::uint16_t>(run.end - 1));
-            component.bottom = run.y;
+            widen(component, run);
         }
     }
     return true;
@@ -131,14 +127,14 @@ bool Detector::search_window(const ImageView& image, Side side, const ExpectedMa
     const Search search{image,       thresholds, side,         largest,
                         window.left, window.top, window.right, window.bottom};
     const std::size_t before = result.blobs.size();
-    const bool counted = examine_window(search, expected, result);
+    if (!examine_window(search, expected, result)) return false;
     const bool found = std::any_of(result.blobs.begin(), result.blobs.end(), [&](const Blob& blob) {
         return is_within_reach(blob.x_px, blob.y_px, expected);
     });
     if (found) drop_cut_off(search);
     split_failed(search, means, result);
     drop_repeats(before, result);
-    return counted;
+    return true;
 }
 
 // What only reaches into the window is left to the window it belongs to, unless the marker may be in it.
@@ -212,11 +208,8 @@ void Detector::examine_part(const Search& search, std::size_t number, SideResult
     }
 }
 
-bool Detector::search_windows(const ImageView& image, std::span<const ExpectedMarker> expected,
+bool Detector::search_windows(const ImageView& image, Side side, std::span<const ExpectedMarker> expected,
                               SideResult& result) {
-    const MarkerPolarity polarity =
-        config_.polarity == MarkerPolarity::kAuto ? state_.polarity : config_.polarity;
-    const Side side = polarity == MarkerPolarity::kBright ? Side::kAbove : Side::kBelow;
     result.blobs.clear();
     result.report = DetectorReport{};
     workspace_.examined.clear();
@@ -239,16 +232,14 @@ bool Detector::search_windows(const ImageView& image, std::span<const ExpectedMa
 void Detector::detect_around(const ImageView& image, std::span<const ExpectedMarker> expected,
                              Observations& observations, DetectorReport& report) {
     const bool knows = is_processable(image) && is_settled() && state_.usual_size_px > 0.0;
-    const MarkerPolarity polarity =
-        config_.polarity == MarkerPolarity::kAuto ? state_.polarity : config_.polarity;
-    const std::size_t side = polarity == MarkerPolarity::kBright ? 1 : 0;
-    if (!knows || !search_windows(image, expected, workspace_.sides[side])) {
+    const std::size_t side = likely_side();
+    if (!knows || !search_windows(image, kSides[side], expected, workspace_.sides[side])) {
         detect(image, observations, report);
         return;
     }
     observations.clear();
     report = DetectorReport{};
-    measure_exposure(image, kLumaRows, report);
+    measure_exposure(image, report);
     add_counts(report, workspace_.sides[side].report);
     finish(side, observations, report);
 }

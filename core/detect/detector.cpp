@@ -10,6 +10,7 @@ namespace rig {
 
 namespace {
 
+constexpr int kLumaRows = 8;    // every so manieth row is enough for the mean
 constexpr int kCorePixels = 3;  // beyond one and a half thresholds
 constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
                                                            0.75};  // of a component's own range of grey
@@ -39,6 +40,13 @@ std::size_t cut(std::span<const Run> runs, std::span<Run> out, bool& truncated, 
         }
     }
     return count;
+}
+
+// The value that `rank` others are no greater than; reorders them.
+double ranked(std::span<float> values, std::size_t rank) {
+    const auto place = values.begin() + static_cast<std::ptrdiff_t>(rank);
+    std::nth_element(values.begin(), place, values.end());
+    return static_cast<double>(*place);
 }
 
 bool in_range(double value, double low, double high) {
@@ -128,8 +136,8 @@ Result<void, DetectorError> Detector::configure(const DetectorConfig& config) {
     return {};
 }
 
-void Detector::measure_exposure(const ImageView& image, int row_step, DetectorReport& report) {
-    const LumaSums sums = luma_sums(image, row_step);
+void Detector::measure_exposure(const ImageView& image, DetectorReport& report) {
+    const LumaSums sums = luma_sums(image, kLumaRows);
     report.mean_luma = static_cast<double>(sums.sum) / sums.samples;
     report.saturated_fraction = static_cast<double>(sums.saturated) / sums.samples;
     if (report.mean_luma < config_.dark_luma)
@@ -219,8 +227,9 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
 void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResult& result) {
     Workspace& w = workspace_;
     if (w.failed.empty()) return;
-    const double largest =
-        state_.usual_size_px > 0.0 ? wide.largest_px : largest_marker(usual_size(result.blobs));
+    const double largest = state_.usual_size_px > 0.0
+                               ? wide.largest_px
+                               : largest_marker(usual(&Blob::long_axis_px, result.blobs));
     const bool narrower = largest < wide.largest_px;
     if (narrower) set_thresholds(means, wide.thresholds, wide.side, largest);
     const Search search{wide.image, wide.thresholds, wide.side,  largest,
@@ -292,35 +301,21 @@ double Detector::largest_marker(double usual_size_px) const {
                                : config_.blob.max_diameter_px;
 }
 
-double Detector::usual_size(const Blobs& blobs) const {
-    std::array<float, kMaxCandidates> sizes{};
+// Median over the sure markers of an image; 0 when they are too few.
+double Detector::usual(double Blob::* property, const Blobs& blobs) const {
+    std::array<float, kMaxCandidates> values{};
     std::size_t count = 0;
     for (const Blob& blob : blobs) {
-        if (blob.badness < kSureBadness) sizes[count++] = static_cast<float>(blob.long_axis_px);
+        if (blob.badness < kSureBadness) values[count++] = static_cast<float>(blob.*property);
     }
-    if (count < config_.size_quorum) return 0.0;
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(sizes.begin(), middle, sizes.begin() + static_cast<std::ptrdiff_t>(count));
-    return static_cast<double>(*middle);
-}
-
-double Detector::usual_depth(const Blobs& blobs) const {
-    std::array<float, kMaxCandidates> depths{};
-    std::size_t count = 0;
-    for (const Blob& blob : blobs) {
-        if (blob.badness < kSureBadness) depths[count++] = static_cast<float>(blob.depth);
-    }
-    if (count < config_.size_quorum) return 0.0;
-    const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(depths.begin(), middle, depths.begin() + static_cast<std::ptrdiff_t>(count));
-    return static_cast<double>(*middle);
+    return count < config_.size_quorum ? 0.0 : ranked(std::span(values).first(count), count / 2);
 }
 
 // The markers of one image are of one make: sizes and depths of ink far from the median are eyes, nostrils,
 // teeth, moles or shadows. Without enough sure markers nothing is said.
 void Detector::apply_population(Side side, SideResult& result) const {
-    const double size = usual_size(result.blobs);
-    const double depth = usual_depth(result.blobs);
+    const double size = usual(&Blob::long_axis_px, result.blobs);
+    const double depth = usual(&Blob::depth, result.blobs);
     const double spread = side == Side::kBelow ? config_.ink_spread : config_.retro_spread;
     result.quality = 0.0;
     for (Blob& blob : result.blobs) {
@@ -339,6 +334,11 @@ void Detector::apply_population(Side side, SideResult& result) const {
 
 bool Detector::is_settled() const {
     return config_.polarity != MarkerPolarity::kAuto || state_.agreed >= config_.polarity_frames;
+}
+
+std::size_t Detector::likely_side() const {
+    const bool automatic = config_.polarity == MarkerPolarity::kAuto;
+    return (automatic ? state_.polarity : config_.polarity) == MarkerPolarity::kBright ? 1 : 0;
 }
 
 void Detector::decide(std::size_t dark_or_bright) {
@@ -395,13 +395,8 @@ void Detector::measure_markers(const SideResult& result, DetectorReport& report)
     }
     if (count == 0) return;
     const std::size_t tenth = count / 10;
-    const auto at = [count](auto& values, std::size_t rank) {
-        const auto place = values.begin() + static_cast<std::ptrdiff_t>(rank);
-        std::nth_element(values.begin(), place, values.begin() + static_cast<std::ptrdiff_t>(count));
-        return static_cast<double>(*place);
-    };
-    report.brightest_level = at(levels, count - 1 - tenth);
-    report.faintest_contrast = at(contrasts, tenth);
+    report.brightest_level = ranked(std::span(levels).first(count), count - 1 - tenth);
+    report.faintest_contrast = ranked(std::span(contrasts).first(count), tenth);
 }
 
 // Which side the markers are on. Both are tried until the decision has settled, and again when that side
@@ -409,12 +404,11 @@ void Detector::measure_markers(const SideResult& result, DetectorReport& report)
 std::size_t Detector::look(const ImageView& image, const BlockGrid& means, DetectorReport& report) {
     Workspace& w = workspace_;
     const auto try_side = [&](std::size_t index) {
-        detect_side(image, means, index == 0 ? Side::kBelow : Side::kAbove, w.sides[index]);
+        detect_side(image, means, kSides[index], w.sides[index]);
         add_counts(report, w.sides[index].report);
     };
     const bool automatic = config_.polarity == MarkerPolarity::kAuto;
-    const MarkerPolarity likely = automatic ? state_.polarity : config_.polarity;
-    const std::size_t first = likely == MarkerPolarity::kBright ? 1 : 0;
+    const std::size_t first = likely_side();
     try_side(first);
     if (is_settled() && (!automatic || w.sides[first].quality >= kSettledQuality)) return first;
     try_side(1 - first);
@@ -431,7 +425,7 @@ void Detector::detect(const ImageView& image, Observations& observations, Detect
         return;
     }
     report.whole_image = true;
-    measure_exposure(image, kLumaRows, report);
+    measure_exposure(image, report);
     const BlockGrid means = block_means(image, workspace_.means);
     finish(look(image, means, report), observations, report);
 }
@@ -439,7 +433,7 @@ void Detector::detect(const ImageView& image, Observations& observations, Detect
 void Detector::finish(std::size_t side, Observations& observations, DetectorReport& report) {
     const SideResult& result = workspace_.sides[side];
     report.polarity = side == 0 ? MarkerPolarity::kDark : MarkerPolarity::kBright;
-    state_.usual_size_px = usual_size(result.blobs);
+    state_.usual_size_px = usual(&Blob::long_axis_px, result.blobs);
     hand_on(result, observations, report);
     measure_markers(result, report);
     if (report.runs_full || report.blobs_full || report.observations_full) {

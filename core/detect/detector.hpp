@@ -79,12 +79,11 @@ void add_counts(DetectorReport& total, const DetectorReport& part);
 inline constexpr float kMaxReachPx =
     24.0F;  // an expected marker farther away than that is searched for in vain
 inline constexpr double kWindowShare = 0.75;
-inline constexpr int kLumaRows = 8;  // every so manieth row is enough for the mean
 
 // How often a blob that is no marker is cut again.
 inline constexpr std::size_t kSplitLevels = 3;
 
-// One camera's detector. Memory is fixed (about 4 MB); detect() never allocates and never fails: hard data
+// One camera's detector. Memory is fixed (about 1.8 MB); detect() never allocates and never fails: hard data
 // give few observations and a report. The order of observations says nothing.
 class Detector {
   public:
@@ -140,6 +139,8 @@ class Detector {
 
     using Blobs = BoundedVector<Blob, kMaxCandidates>;
 
+    static constexpr std::array<Side, 2> kSides{Side::kBelow, Side::kAbove};  // dark markers, bright ones
+
     // What one polarity makes of the image.
     struct SideResult {
         Blobs blobs;
@@ -173,11 +174,11 @@ class Detector {
         std::array<SideResult, 2> sides;
     };
 
-    void measure_exposure(const ImageView& image, int row_step, DetectorReport& report);
+    void measure_exposure(const ImageView& image, DetectorReport& report);
     void set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side, double largest_px);
     void detect_side(const ImageView& image, const BlockGrid& means, Side side, SideResult& result);
-    [[nodiscard]] bool search_windows(const ImageView& image, std::span<const ExpectedMarker> expected,
-                                      SideResult& result);
+    [[nodiscard]] bool search_windows(const ImageView& image, Side side,
+                                      std::span<const ExpectedMarker> expected, SideResult& result);
     [[nodiscard]] bool search_window(const ImageView& image, Side side, const ExpectedMarker& expected,
                                      SideResult& result);
     [[nodiscard]] bool examine_window(const Search& search, const ExpectedMarker& expected,
@@ -186,6 +187,7 @@ class Detector {
     void drop_cut_off(const Search& search);
     static void drop_repeats(std::size_t first, SideResult& result);
     [[nodiscard]] bool is_settled() const;
+    [[nodiscard]] std::size_t likely_side() const;
     void finish(std::size_t side, Observations& observations, DetectorReport& report);
     void split_failed(const Search& wide, const BlockGrid& means, SideResult& result);
     [[nodiscard]] double largest_marker(double usual_size_px) const;
@@ -194,8 +196,7 @@ class Detector {
     [[nodiscard]] bool examine(const Search& search, const Component& component, std::span<const Run> runs,
                                const Siblings& siblings, SideResult& result);
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
-    [[nodiscard]] double usual_size(const Blobs& blobs) const;
-    [[nodiscard]] double usual_depth(const Blobs& blobs) const;
+    [[nodiscard]] double usual(double Blob::* property, const Blobs& blobs) const;
     void apply_population(Side side, SideResult& result) const;
     [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);
     void decide(std::size_t dark_or_bright);

@@ -10,8 +10,7 @@ namespace rig {
 namespace {
 
 constexpr double kFull = 256.0;      // cover of a pixel that is all blob
-constexpr double kLeastCover = 0.4;  // beyond the skin's level, in units of the contrast,
-constexpr double kLeastNoise = 4.0;  // and of the skin's own deviation
+constexpr double kLeastNoise = 4.0;  // beyond the skin's level, in units of its own deviation
 constexpr int kRounds = 12;          // halve what is left, or better, up to three quarters of the way hidden
 constexpr double kStride = 2.0;      // of each; the plain step (1) falls short by the hidden part of the rim
 constexpr double kMostHidden = 0.4;  // of the ellipse
@@ -70,7 +69,7 @@ SoftMoments step_towards(const SoftMoments& from, const SoftMoments& to, double 
 }  // namespace
 
 bool mark_hidden(const BlobWorkspace& w, double noise_cover, BitRows& hidden) {
-    const auto least = static_cast<int>(-kFull * std::max(kLeastCover, kLeastNoise * noise_cover));
+    const auto least = static_cast<int>(-kFull * std::max(kHiddenCover, kLeastNoise * noise_cover));
     BitRows near = w.blob;
     grow_square(near, w.height);
     grow_cross(near, w.height);

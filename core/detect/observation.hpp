@@ -20,6 +20,9 @@ struct Observation {
     float score = 0.0F;        // 0..1, how much it looks like a marker
 };
 
+// Standard deviation of a detected centre: measured on rendered frames, blur and noise.
+inline constexpr double kCentreSigmaPx = 0.15;
+
 using Observations = BoundedVector<Observation, kMaxObservations>;
 
 }  // namespace rig

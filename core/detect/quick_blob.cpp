@@ -23,11 +23,10 @@ constexpr int kCoarse = 16;      // fixed point of a distance from the backgroun
 constexpr int kFine = 32;        // and of an outline
 constexpr int kReach = 1;        // px that the outline may lie outside the start
 constexpr double kFullWeight = 255.0;
-constexpr double kSure = 0.8;        // badness of a marker above which it is measured again, slowly
-constexpr double kBeyondSkin = 0.4;  // of the contrast, by which a pixel that is neither paint nor skin shows
-constexpr double kSteepest = 0.8;    // change of the light from the window's centre to its corner
-constexpr double kSpread = 0.2;      // of the contrast, that the skin around may stray from its plane
-constexpr double kCleanRim = 0.97;   // of the rim is skin: nothing reaches the blob from outside
+constexpr double kSure = 0.8;       // badness of a marker above which it is measured again, slowly
+constexpr double kSteepest = 0.8;   // change of the light from the window's centre to its corner
+constexpr double kSpread = 0.2;     // of the contrast, that the skin around may stray from its plane
+constexpr double kCleanRim = 0.97;  // of the rim is skin: nothing reaches the blob from outside
 
 // Over the pixels that count: x and y from the window's centre, t = grey level - guess.
 struct RimSums {
@@ -315,8 +314,7 @@ std::uint64_t QuickMeasure::marked(const Slope& level, int y, std::uint64_t look
 // What of a row hangs together with the row before it, gaps filled; `row` is not empty.
 std::uint64_t chain(std::uint64_t row, std::uint64_t before) {
     std::uint64_t joined = row & (before | before << 1 | before >> 1);
-    const bool one_run = (row & (row + (row & (~row + 1)))) == 0;
-    if (joined == 0 || one_run) return joined == 0 ? 0 : row;
+    if (joined == 0 || beyond_first_run(row) == 0) return joined == 0 ? 0 : row;
     for (std::uint64_t wider = joined;; joined = wider) {
         wider = (joined | joined << 1 | joined >> 1) & row;
         if (wider == joined) break;
@@ -391,7 +389,7 @@ SoftMoments QuickMeasure::moments(double outline, double contrast) {
             deepest = under < deepest ? under : deepest;
         }
     }
-    const double skin = (outline - kSoftRamp + kBeyondSkin) * contrast * scale;
+    const double skin = (outline - kSoftRamp + kHiddenCover) * contrast * scale;
     for (int lane = 0; lane < kPixelLanes; ++lane) hidden_ = hidden_ || deepest[lane] < -skin;
     return gather(lanes, last_ + 1, scale * 2.0 * kSoftRamp * contrast);
 }

@@ -123,7 +123,7 @@ std::array<std::uint8_t, kLanes> last_pixels(const std::uint8_t* pixels, std::si
 
 constexpr std::size_t kScan = 2 * kLanes;  // pixels looked at in one step
 
-// Runs of one row, pixels in `levels` order; the row and its levels are readable to a multiple of kScan.
+// Runs of one row; whole vectors of its pixels and levels at a time.
 class RowScan {
   public:
     RowScan(int y, Run* runs) : y_(static_cast<std::uint16_t>(y)), runs_(runs) {}

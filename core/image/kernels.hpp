@@ -30,11 +30,6 @@ struct Run {
     std::uint16_t end = 0;
 };
 
-// One bit per byte of a word of bytes that are zero or odd, lowest address first.
-[[nodiscard]] constexpr std::uint32_t packed_bytes(std::uint64_t word) {
-    return static_cast<std::uint32_t>(((word & 0x0101010101010101ULL) * 0x0102040810204080ULL) >> 56);
-}
-
 struct LumaSums {
     std::uint64_t sum = 0;
     std::uint32_t saturated = 0;  // pixels of 255

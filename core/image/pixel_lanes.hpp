@@ -51,14 +51,16 @@ inline void store_bytes(SixteenBytes bytes, std::uint8_t* to) {
     return (pairs & 0xFF) + (pairs >> 8);
 }
 
+// One bit per byte of a word of bytes that are zero or odd, lowest address first.
+[[nodiscard]] constexpr std::uint32_t packed_bytes(std::uint64_t word) {
+    return static_cast<std::uint32_t>(((word & 0x0101010101010101ULL) * 0x0102040810204080ULL) >> 56);
+}
+
 // One bit for each byte of 0xFF, none for those of 0.
 [[nodiscard]] inline std::uint32_t bits_of_bytes(SixteenBytes mask) {
     std::uint64_t words[2];
     std::memcpy(words, &mask, sizeof(words));
-    const auto packed = [](std::uint64_t word) {
-        return static_cast<std::uint32_t>(((word & 0x0101010101010101ULL) * 0x0102040810204080ULL) >> 56);
-    };
-    return packed(words[0]) | packed(words[1]) << 8;
+    return packed_bytes(words[0]) | packed_bytes(words[1]) << 8;
 }
 
 [[nodiscard]] inline bool any_bit(SixteenBytes bytes) {
@@ -90,7 +92,7 @@ inline void store_bytes(SixteenBytes bytes, std::uint8_t* to) {
     const EightSigned bytes = __builtin_convertvector(mask, EightSigned);
     std::uint64_t word = 0;
     std::memcpy(&word, &bytes, sizeof(word));
-    return ((word & 0x0101010101010101ULL) * 0x0102040810204080ULL) >> 56;
+    return packed_bytes(word);
 }
 
 struct EightFloats {

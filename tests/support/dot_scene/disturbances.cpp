@@ -61,6 +61,7 @@ class Painter {
 
   private:
     void paint(const Stain& stain);
+    void glint(const DiscTruth& disc, double angle, double offset, double size);
     [[nodiscard]] double far_from_discs(double x, double y) const;
     // Somewhere on the middle of the head.
     void place(double& x, double& y) {
@@ -109,19 +110,24 @@ double Painter::far_from_discs(double x, double y) const {
     return least;
 }
 
+// A spot of the lamp, that far from a disc's middle.
+void Painter::glint(const DiscTruth& disc, double angle, double offset, double size) {
+    paint({.x = disc.x_px + offset * std::cos(angle),
+           .y = disc.y_px + offset * std::sin(angle),
+           .length = size * random_.uniform(1.0, 1.8),
+           .width = size,
+           .angle = random_.uniform(0.0, kTurn),
+           .soft = 0.5 * size,
+           .added = random_.uniform(0.4, 3.5) * skin_});
+}
+
 void Painter::glints_on_discs() {
     for (const DiscTruth& disc : discs_) {
         if (!random_.chance(0.4)) continue;
         const double angle = random_.uniform(0.0, kTurn);
         const double offset = random_.uniform(0.0, 0.35) * disc.diameter_px * disc.cosine;
         const double size = random_.uniform(0.1, 0.25) * disc.diameter_px;
-        paint({.x = disc.x_px + offset * std::cos(angle),
-               .y = disc.y_px + offset * std::sin(angle),
-               .length = size * random_.uniform(1.0, 1.8),
-               .width = size,
-               .angle = random_.uniform(0.0, kTurn),
-               .soft = 0.5 * size,
-               .added = random_.uniform(0.4, 3.5) * skin_});
+        glint(disc, angle, offset, size);
     }
 }
 
@@ -131,13 +137,7 @@ void Painter::glints_on_skin() {
         const double angle = random_.uniform(0.0, kTurn);
         const double offset = random_.uniform(0.6, 1.1) * disc.diameter_px;
         const double size = random_.uniform(0.15, 0.4) * disc.diameter_px;
-        paint({.x = disc.x_px + offset * std::cos(angle),
-               .y = disc.y_px + offset * std::sin(angle),
-               .length = size * random_.uniform(1.0, 1.8),
-               .width = size,
-               .angle = random_.uniform(0.0, kTurn),
-               .soft = 0.5 * size,
-               .added = random_.uniform(0.4, 3.5) * skin_});
+        glint(disc, angle, offset, size);
     }
     for (int i = 0; i < 25; ++i) {
         Stain spot;
