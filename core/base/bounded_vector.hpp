@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <utility>
 
 #include "core/base/check.hpp"
 
@@ -53,5 +54,19 @@ class BoundedVector {
     std::array<T, kCapacity> items_{};
     std::size_t size_ = 0;
 };
+
+// Keeps `items` in falling order of value_of(item), of equals the older ones first; without room the last one
+// falls out. False when that is the new one.
+template <class T, std::size_t kCapacity, class ValueOf>
+bool keep_best(BoundedVector<T, kCapacity>& items, const T& item, ValueOf value_of) {
+    if (items.full()) {
+        if (!(value_of(items[items.size() - 1]) < value_of(item))) return false;
+        items.pop_back();
+    }
+    if (!items.push_back(item)) return false;
+    for (std::size_t i = items.size() - 1; i > 0 && value_of(items[i - 1]) < value_of(items[i]); --i)
+        std::swap(items[i - 1], items[i]);
+    return true;
+}
 
 }  // namespace rig

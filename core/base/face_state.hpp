@@ -22,6 +22,11 @@ enum class CameraStatus : std::uint8_t {
     kExposure = 5  // too dark, too bright, or changing at once
 };
 
+// Whether a camera's picture of this tick is looked at.
+[[nodiscard]] constexpr bool has_picture(CameraStatus status) {
+    return status == CameraStatus::kGood || status == CameraStatus::kExposure;
+}
+
 // Headset slip: observed = R(rotation) face + translation. Rotation vector, rig origin.
 struct Slip {
     std::array<float, 3> rotation_rad{};

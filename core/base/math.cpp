@@ -150,6 +150,12 @@ Vec3 vector_from_rotation(const Mat3& rotation) {
     return axis * angle;
 }
 
+Vec3 perpendicular_to(const Vec3& n) {
+    const Vec3 aside = n.x() * n.x() < 0.5 * n.squaredNorm() ? Vec3(1.0, 0.0, 0.0) : Vec3(0.0, 1.0, 0.0);
+    const Vec3 across = n.cross(aside);
+    return across / sqrt(across.squaredNorm());
+}
+
 Mat3 orthonormalised(const Mat3& nearly_rotation) {
     Mat3 r = nearly_rotation;
     for (int i = 0; i < 12; ++i) {

@@ -32,6 +32,8 @@ struct SinCos {
 // meet.
 [[nodiscard]] Mat3 rotation_from_vector(const Vec3& r_rad);
 [[nodiscard]] Vec3 vector_from_rotation(const Mat3& rotation);
+// A unit vector at right angles to n, which is not zero.
+[[nodiscard]] Vec3 perpendicular_to(const Vec3& n);
 // Nearest rotation to a matrix that is one up to rounding (one polar Newton step repeated to convergence).
 [[nodiscard]] Mat3 orthonormalised(const Mat3& nearly_rotation);
 

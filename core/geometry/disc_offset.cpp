@@ -21,13 +21,6 @@ constexpr std::array<std::array<double, 2>, 8> kDirections = {{{1.0, 0.0},
                                                                {0.0, -1.0},
                                                                {kDiagonal, -kDiagonal}}};
 
-// A unit vector at right angles to n.
-Vec3 tangent_of(const Vec3& n) {
-    const Vec3 other = n.x() * n.x() < 0.5 * n.squaredNorm() ? Vec3(1.0, 0.0, 0.0) : Vec3(0.0, 1.0, 0.0);
-    const Vec3 across = n.cross(other);
-    return across / sqrt(across.squaredNorm());
-}
-
 }  // namespace
 
 Vec2 disc_centroid_offset(const SkinDisc& disc) {
@@ -38,7 +31,7 @@ Vec2 disc_centroid_offset(const SkinDisc& disc) {
     const bool usable = c.z() > 0.0 && r > 0.0 && is_finite(c.squaredNorm() + r + k) &&
                         n.squaredNorm() > 0.25 && n.squaredNorm() < 4.0;
     if (!usable) return Vec2::Zero();
-    const Vec3 u = tangent_of(n);
+    const Vec3 u = perpendicular_to(n);
     const Vec3 v = n.cross(u);
     const Vec2 middle(c.x() / c.z(), c.y() / c.z());
     double area = 0.0;

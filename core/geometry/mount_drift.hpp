@@ -17,6 +17,8 @@ namespace rig {
 struct HelmetMark {
     Vec3 headset_mm = Vec3::Zero();
     std::uint8_t cameras = 0;  // bit c: camera c can see it
+
+    [[nodiscard]] bool is_seen_by(std::size_t camera) const { return (cameras >> camera & 1U) != 0; }
 };
 
 struct ReferenceMark {

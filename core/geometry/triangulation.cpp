@@ -22,6 +22,13 @@ Mat3 inverse_3x3(const Mat3& a) {
     return inverse;
 }
 
+double measured_length_mm(const Mat3& information, const Vec3& difference_mm) {
+    const double trace = information.trace();
+    if (!(trace > 0.0)) return 0.0;
+    const Vec3 weighted = information * difference_mm;
+    return std::sqrt(difference_mm.dot(weighted) * 3.0 / trace);
+}
+
 bool covariance_from_information(const Mat3& information, double most_sigma_mm, Mat3& covariance_mm2) {
     const Mat3 inverse = inverse_3x3(information);
     double largest = 0.0;

@@ -39,6 +39,10 @@ struct Triangulation {
 [[nodiscard]] Triangulation triangulate(std::span<const Sighting> sightings, const Vec3& expected_mm,
                                         double prior_information);
 
+// Length of a difference in the directions that were measured: as if every one were known as well as these
+// on average. 0 where nothing is known.
+[[nodiscard]] double measured_length_mm(const Mat3& information, const Vec3& difference_mm);
+
 // Covariance of a position, mm^2, from its information. Nothing (false) where the sightings leave a direction
 // open: one ray, or rays so nearly parallel that a standard deviation exceeds most_sigma_mm.
 [[nodiscard]] bool covariance_from_information(const Mat3& information, double most_sigma_mm,

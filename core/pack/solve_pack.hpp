@@ -128,6 +128,9 @@ struct SolvePack {
     // Dots fixed to the helmet, which tell whether a camera still sits as calibrated; 0 on rigs without.
     std::uint8_t reference_mark_count = 0;
     std::array<HelmetMark, kMaxReferenceMarks> reference_marks{};
+    [[nodiscard]] std::span<const HelmetMark> helmet_marks() const {
+        return std::span(reference_marks).first(reference_mark_count);
+    }
 
     std::array<std::string_view, kMaxShapes> shape_names{};
     std::array<std::string_view, kMaxMarkers> marker_names{};

@@ -34,7 +34,7 @@ void expect_markers(const CameraModel& camera, std::size_t camera_number, const 
                expected);
     }
     for (const HelmetMark& mark : marks) {
-        if ((mark.cameras >> camera_number & 1U) == 0) continue;
+        if (!mark.is_seen_by(camera_number)) continue;
         expect(camera, mark.headset_mm, 0.0, kMarkReachPx, false, expected);
     }
 }

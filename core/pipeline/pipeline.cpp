@@ -11,7 +11,6 @@ namespace rig {
 
 namespace {
 
-constexpr double kCentreSigmaPx = 0.15;  // of a detected centre: measured on rendered frames, blur and noise
 constexpr double kNominalDepthMm = 200.0;       // helmet camera to face, when the calibration does not tell
 constexpr std::uint32_t kWholeImageEvery = 32;  // frames, of each camera
 constexpr std::int64_t kDecayUs = 400'000;      // to the rest pose, policy kDecay
@@ -26,10 +25,6 @@ constexpr double kHeadStepMm = 3.0;
 constexpr double kHeadSigmaPx = 0.3;  // of a named pixel about the fitted face
 constexpr double kNeutralS = 1.0;     // of a face at rest that becomes the neutral ...
 constexpr int kNeutralPatience = 3;   // ... within so many times as long
-
-bool usable_status(CameraStatus status) {
-    return status == CameraStatus::kGood || status == CameraStatus::kExposure;
-}
 
 double rest(const SolvePack& pack, std::size_t i) {
     return std::clamp(0.0, static_cast<double>(pack.weight_low[i]), static_cast<double>(pack.weight_high[i]));
@@ -179,16 +174,15 @@ void Pipeline::find_markers(std::size_t camera, const ImageView& image) {
                                       std::span(tracker_.missed).first(pack_.marker_count),
                                       std::span(track_report_.matches[camera]).first(pack_.marker_count)};
     expect_markers(turned_camera(pack_.cameras[camera], mounts_[camera].turn_rad), camera, prediction,
-                   std::span(pack_.reference_marks).first(pack_.reference_mark_count), expected_);
+                   pack_.helmet_marks(), expected_);
     detector.detect_around(image, expected_.span(), observations_[camera], detector_reports_[camera]);
 }
 
 void Pipeline::take_observations(std::size_t camera, std::span<const Observation> observations,
                                  FrameReport& report) {
     report.observations[camera] = static_cast<std::uint16_t>(observations.size());
-    find_helmet_marks(pack_.cameras[camera], camera,
-                      std::span(pack_.reference_marks).first(pack_.reference_mark_count), observations,
-                      mark_config_, mounts_[camera], helmet_marks_);
+    find_helmet_marks(pack_.cameras[camera], camera, pack_.helmet_marks(), observations, mark_config_,
+                      mounts_[camera], helmet_marks_);
     report.mounts[camera] = helmet_marks_.drift;
     add_camera_view(helmet_marks_.now, observations, kCentreSigmaPx, camera_depth_mm_[camera], sightings_,
                     helmet_marks_.taken.span());
@@ -215,8 +209,8 @@ void Pipeline::step(const FrameSet& frame, FaceState& state, FrameReport& report
     for (std::size_t c = 0; c < pack_.camera_count && configured_; ++c) {
         observations_[c].clear();
         CameraStatus status = c < frame.camera_count ? frame.status[c] : CameraStatus::kMissing;
-        if (usable_status(status) && frame.images[c].empty()) status = CameraStatus::kMissing;
-        if (usable_status(status)) {
+        if (has_picture(status) && frame.images[c].empty()) status = CameraStatus::kMissing;
+        if (has_picture(status)) {
             find_markers(c, frame.images[c]);
             if (detector_reports_[c].exposure != 0) status = CameraStatus::kExposure;
             state.faults |= detector_reports_[c].faults;
@@ -240,7 +234,7 @@ void Pipeline::step(const ObservationFrame& frame, FaceState& state, FrameReport
         const CameraStatus status = c < frame.camera_count ? frame.status[c] : CameraStatus::kMissing;
         state.cameras[c] = status;
         if (status == CameraStatus::kExposure) state.faults |= fault_bit(Fault::kExposure);
-        if (usable_status(status)) {
+        if (has_picture(status)) {
             any = true;
             for (const Observation& observation : frame.cameras[c]) {
                 if (!observations_[c].push_back(observation)) break;
@@ -302,9 +296,7 @@ void Pipeline::find_head_pose(FrameReport& report) {
             const Observation& seen = observations_[c][static_cast<std::size_t>(at)];
             const Vec3 face_mm =
                 model_.face_position(k, stabilised_.fit.coefficients) + neutral_.offset_mm[k];
-            const bool kept = named_pixels_.push_back(
-                {&pack_.cameras[c], face_mm,
-                 Vec2{static_cast<double>(seen.x_px), static_cast<double>(seen.y_px)}});
+            const bool kept = named_pixels_.push_back({&pack_.cameras[c], face_mm, pixel_of(seen)});
             RIG_CHECK(kept);
         }
     }
@@ -346,7 +338,7 @@ void Pipeline::solve_named(std::int64_t capture_us, FrameReport& report) {
 bool Pipeline::is_partial(const FaceState& state) const {
     for (std::size_t c = 0; c < pack_.camera_count; ++c) {
         // A marker stream has no cameras to miss.
-        if (sightings_.from_cameras && !usable_status(state.cameras[c])) return true;
+        if (sightings_.from_cameras && !has_picture(state.cameras[c])) return true;
     }
     for (std::size_t i = 0; i < pack_.shape_count; ++i) {
         const float full = solver_config_.full_confidence[i];

@@ -24,11 +24,6 @@ bool same_weight(const Mat3& now, const Mat3& used) {
     return (now - used).cwiseAbs().maxCoeff() <= kSameInformation * now.trace();
 }
 
-Vec3 neutral(const SolvePack& pack, std::size_t k) {
-    return {static_cast<double>(pack.neutral_mm[3 * k]), static_cast<double>(pack.neutral_mm[3 * k + 1]),
-            static_cast<double>(pack.neutral_mm[3 * k + 2])};
-}
-
 template <typename Real>
 class HessianFollower {
   public:
@@ -152,7 +147,7 @@ void build_linear(const SolvePack& pack, const NormalTables<Real>& tables, const
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         if (unseen(input.weights[k])) continue;
         ++e.markers_used;
-        const Vec3 error = neutral(pack, k) - input.positions_mm[k];
+        const Vec3 error = point_at(pack.neutral_mm, k) - input.positions_mm[k];
         const Vec3 weighted = state.weights[k] * error;
         e.constant_mm2 += error.dot(weighted);
         for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -222,7 +217,7 @@ double residual_rms_mm(const SolvePack& pack, const NormalTables<Real>& tables, 
     for (std::size_t k = 0; k < pack.marker_count; ++k) {
         const Mat3& v = input.weights[k];
         if (unseen(v)) continue;
-        Vec3 error = neutral(pack, k) - input.positions_mm[k];
+        Vec3 error = point_at(pack.neutral_mm, k) - input.positions_mm[k];
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const Real* row = tables.basis_mm.data() + (3 * k + axis) * stride;
             error[static_cast<Eigen::Index>(axis)] += static_cast<double>(padded_dot(row, w.data(), wide));

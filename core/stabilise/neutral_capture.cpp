@@ -14,17 +14,12 @@ namespace {
 // some milliradians with the face, which is no knowledge of depth.
 constexpr double kLeastShare = 1e-3;
 
-Vec3 neutral_of(std::span<const float> neutral_mm, std::size_t k) {
-    return {static_cast<double>(neutral_mm[3 * k]), static_cast<double>(neutral_mm[3 * k + 1]),
-            static_cast<double>(neutral_mm[3 * k + 2])};
-}
-
 void add_frame(const ShapeModel& model, std::span<const float> neutral_mm, const StabiliserOutput& stabilised,
                NeutralState& state) {
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         const StabilisedMarker& marker = stabilised.markers[k];
         if (!marker.seen) continue;
-        const Vec3 off = marker.position_mm - neutral_of(neutral_mm, k);
+        const Vec3 off = marker.position_mm - point_at(neutral_mm, k);
         ++state.seen[k];
         state.sum_mm[k] += off;
         state.squares_mm2[k] += off.dot(off);
@@ -91,7 +86,7 @@ double expression_rms(const ShapeModel& model, std::span<const float> neutral_mm
     for (std::size_t j = 0; j < model.mode_count; ++j) mean[j] = state.coefficients[j] / state.frames;
     double sum = 0.0;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
-        const Vec3 off = model.face_position(k, mean) - neutral_of(neutral_mm, k);
+        const Vec3 off = model.face_position(k, mean) - point_at(neutral_mm, k);
         sum += off.dot(off);
     }
     return std::sqrt(sum / static_cast<double>(model.marker_count));

@@ -71,14 +71,6 @@ bool moved_too_far(const StabiliserConfig& config, const Rigid& from, const Rigi
            std::sqrt(turn.dot(turn)) > config.jolt_sigmas * config.step_rotation_sigma_rad;
 }
 
-// In the directions that were measured.
-double length_mm(const Mat3& information, const Vec3& e) {
-    const double trace = information.trace();
-    if (!(trace > 0.0)) return 0.0;
-    const Vec3 weighted = information * e;
-    return std::sqrt(e.dot(weighted) * 3.0 / trace);
-}
-
 // How far a marker stands off the face that the other markers make. A marker drags its own place along, some
 // by three quarters: its distance from the common fit would hide it and accuse its neighbours.
 double distance_from_others_mm(const ShapeModel& model, const NamedMarker& marker, std::size_t k,
@@ -88,7 +80,7 @@ double distance_from_others_mm(const ShapeModel& model, const NamedMarker& marke
     const Mat3 known = turned * rotation.transpose();
     const Mat3 system = Mat3::Identity() - kOwnShare * known * w.informations[k];
     const Vec3 alone = inverse_3x3(system) * e;
-    return length_mm(marker.information, alone);
+    return measured_length_mm(marker.information, alone);
 }
 
 // True when what some marker counts changed enough to move the fit. Of those still trusted only the worst and
@@ -100,7 +92,8 @@ bool doubt_markers(const ShapeModel& model, const StabiliserConfig& config, cons
     for (std::size_t k = 0; k < named.count; ++k) {
         const NamedMarker& marker = named.markers[k];
         w.distance_mm[k] =
-            marker.seen ? length_mm(marker.information, marker.position_mm - w.fit.headset_mm[k]) : 0.0;
+            marker.seen ? measured_length_mm(marker.information, marker.position_mm - w.fit.headset_mm[k])
+                        : 0.0;
         if (w.trust[k] == 1.0) farthest_mm = std::max(farthest_mm, w.distance_mm[k]);
     }
     const double suspect_mm = std::max(kSuspectShare * config.outlier_mm, kNearShare * farthest_mm);

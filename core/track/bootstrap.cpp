@@ -154,13 +154,7 @@ void keep_start(const ShapeFit& fit, double score, BootstrapWorkspace& w) {
         w.starts.pop_back();
         break;
     }
-    if (w.starts.full()) {
-        if (w.starts[w.starts.size() - 1].score >= score) return;
-        w.starts.pop_back();
-    }
-    if (!w.starts.push_back({fit, score})) return;
-    for (std::size_t i = w.starts.size() - 1; i > 0 && w.starts[i - 1].score < w.starts[i].score; --i)
-        std::swap(w.starts[i - 1], w.starts[i]);
+    keep_best(w.starts, {fit, score}, [](const BootstrapStart& start) { return start.score; });
 }
 
 // Candidates by votes become starts; then the best of them with another expression each.

@@ -5,6 +5,7 @@
 
 #include "core/base/check.hpp"
 #include "core/base/math.hpp"
+#include "core/track/sightings.hpp"
 
 namespace rig {
 
@@ -18,15 +19,11 @@ struct ExpectedMark {
 };
 using ExpectedMarks = BoundedVector<ExpectedMark, kMaxReferenceMarks>;
 
-Vec2 pixel_of(const Observation& observation) {
-    return {static_cast<double>(observation.x_px), static_cast<double>(observation.y_px)};
-}
-
 ExpectedMarks expected_marks(const CameraModel& camera, std::size_t index,
                              std::span<const HelmetMark> marks) {
     ExpectedMarks expected;
     for (std::size_t i = 0; i < marks.size(); ++i) {
-        if ((marks[i].cameras >> index & 1U) == 0) continue;
+        if (!marks[i].is_seen_by(index)) continue;
         const Projection at = project(camera, marks[i].headset_mm);
         if (!(at.z_mm > 1.0) || !is_finite(at.pixel[0]) || !is_finite(at.pixel[1])) continue;
         const bool kept = expected.push_back({i, at.pixel});

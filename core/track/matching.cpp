@@ -5,6 +5,7 @@
 
 #include "core/base/bounded_vector.hpp"
 #include "core/base/check.hpp"
+#include "core/base/math.hpp"
 
 namespace rig {
 
@@ -82,10 +83,7 @@ bool find_axes(std::span<const Sighting> seen, ViewPlane& plane) {
     const double length = std::sqrt(along.dot(along));
     if (!(length > kLeastCosine * static_cast<double>(seen.size()))) return false;
     along /= length;
-    const bool steep = along[0] * along[0] > 0.5;
-    const Vec3 aside = steep ? Vec3{0.0, 1.0, 0.0} : Vec3{1.0, 0.0, 0.0};
-    const Vec3 across = along.cross(aside);
-    plane.axes[0] = across / std::sqrt(across.dot(across));
+    plane.axes[0] = perpendicular_to(along);
     plane.axes[1] = along.cross(plane.axes[0]);
     plane.axes[2] = along;
     plane.origin_mm = seen[0].point_mm;

@@ -138,16 +138,6 @@ Vec3 peak_of(const Grid& grid, Workspace& w, std::uint32_t& votes) {
     return offset_mm;
 }
 
-void keep(const PoseCandidate& candidate, Candidates& candidates) {
-    if (candidates.full()) {
-        if (candidate.votes <= candidates[candidates.size() - 1].votes) return;
-        candidates.pop_back();
-    }
-    if (!candidates.push_back(candidate)) return;
-    for (std::size_t i = candidates.size() - 1; i > 0 && candidates[i - 1].votes < candidates[i].votes; --i)
-        std::swap(candidates[i - 1], candidates[i]);
-}
-
 struct Search {
     const ShapeModel& model;
     Grid grid;
@@ -181,7 +171,7 @@ void try_rotation(const Search& search, const Rigid& nominal, const Vec3& turn_r
         const Vec3 offset_mm = peak_of(search.grid, w, candidate.votes);
         candidate.pose.rotation = rotation;
         candidate.pose.translation_mm = centre + offset_mm - rotation * search.centre_mm;
-        keep(candidate, candidates);
+        keep_best(candidates, candidate, [](const PoseCandidate& c) { return c.votes; });
     }
 }
 

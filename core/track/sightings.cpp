@@ -43,8 +43,7 @@ void add_camera_view(const CameraModel& camera, std::span<const Observation> obs
         }
         Sighting sighting;
         sighting.point_mm = camera.centre_mm;
-        sighting.direction = pixel_ray(camera, Vec2{static_cast<double>(observations[i].x_px),
-                                                    static_cast<double>(observations[i].y_px)});
+        sighting.direction = pixel_ray(camera, pixel_of(observations[i]));
         sighting.information = 1.0 / (sigma_mm * sigma_mm);
         sighting.delay_us = row_delay_us(camera, static_cast<double>(observations[i].y_px));
         if (finite(sighting.direction)) append(set, view, i, sighting);

@@ -38,6 +38,10 @@ struct SightingSet {
     }
 };
 
+[[nodiscard]] inline Vec2 pixel_of(const Observation& observation) {
+    return {static_cast<double>(observation.x_px), static_cast<double>(observation.y_px)};
+}
+
 // The sighting as it would have been at the frame's capture time, the exposure of its middle row: moved back
 // by what its marker, at this velocity, went since. A ray keeps its direction: what that leaves out is of
 // second order in the motion during a read-out.

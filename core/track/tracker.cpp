@@ -71,9 +71,7 @@ double residual_of(const TrackerWorkspace& w, const TrackerState& state, const N
                    std::size_t k) {
     const Vec3 e = named.markers[k].position_mm - w.fit.headset_mm[k] - state.bias_mm[k];
     // Only what was measured counts: the depth along a single ray was predicted.
-    const double trust = named.markers[k].information.trace();
-    const Vec3 measured = named.markers[k].information * e;
-    return trust > 0.0 ? std::sqrt(e.dot(measured) * 3.0 / trust) : 0.0;
+    return measured_length_mm(named.markers[k].information, e);
 }
 
 // Fit, then again without the names that the first fit contradicts.
