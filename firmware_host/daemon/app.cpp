@@ -102,9 +102,7 @@ void App::expose(const FrameSet& frames) {
     exposure_faults_ = 0;
     if (!config_.exposure || parts_.pack == nullptr) return;
     for (std::size_t c = 0; c < feeds_.size(); ++c) {
-        const CameraStatus status = frames.status[c];  // others were not looked at
-        if (status != CameraStatus::kGood && status != CameraStatus::kExposure) continue;
-        if (frames.images[c].empty()) continue;
+        if (!has_picture(frames.status[c]) || frames.images[c].empty()) continue;
         const DetectorReport& seen = parts_.pipeline.detector_report(c);
         const LightReading reading{seen.brightest_level, seen.faintest_contrast,
                                    static_cast<std::uint16_t>(parts_.pipeline.observations(c).size()),

@@ -93,8 +93,7 @@ int run_control(const ControlOptions& options) {
     wanted.streams = 0;
     const auto link = LinkSession::open(options.link, wanted, {});
     if (!link) return kExitDevice;
-    const auto end =
-        link->run([&] { return link->session().phase() == SessionPhase::kReady; }, options.timeout_s);
+    const auto end = link->run_until_ready(options.timeout_s);
     if (end != LinkSession::End::kDone) return report_end(end, *link);
     return send_controls(options, lines, *link);
 }
@@ -111,10 +110,7 @@ void add_control_verb(CLI::App& app, int& exit_code) {
         ->type_name("FILE.toml");
     verb->add_flag("--neutral", options->neutral, "first take back everything that was ever set");
     verb->add_flag("--list-shapes", options->list_shapes, "only print the shapes of the rig's pack");
-    verb->add_option("--timeout", options->timeout_s, "how long to wait for an answer, s")
-        ->capture_default_str()
-        ->check(CLI::Range(0.1, 3600.0))
-        ->type_name("S");
+    add_timeout_option(*verb, options->timeout_s);
     verb->footer(
         "Controls: WHO.CONTROL=VALUE, WHO a shape's name or a region: brows, lids, cheeks, nose, mouth, "
         "jaw,\n"

@@ -115,10 +115,7 @@ void add_info_verb(CLI::App& app, int& exit_code) {
     CLI::Option* link = add_link_option(*verb, options->link);
     CLI::Option* file = verb->add_option("file", options->recording, "a recording of `headrig record --raw`");
     file->type_name("FILE.rec")->excludes(link);
-    verb->add_option("--timeout", options->timeout_s, "how long to wait for an answer, s")
-        ->capture_default_str()
-        ->check(CLI::Range(0.1, 3600.0))
-        ->type_name("S");
+    add_timeout_option(*verb, options->timeout_s);
     verb->footer(
         "Prints the rig's name, versions, pack, shapes and markers. Owns nothing: another host may stream "
         "meanwhile.\n"

@@ -48,6 +48,13 @@ CLI::Option* add_link_option(CLI::App& verb, std::string& link) {
         ->type_name("LINK");
 }
 
+CLI::Option* add_timeout_option(CLI::App& verb, double& timeout_s) {
+    return verb.add_option("--timeout", timeout_s, "how long to wait for an answer, s")
+        ->capture_default_str()
+        ->check(CLI::Range(0.1, 3600.0))
+        ->type_name("S");
+}
+
 std::int64_t host_now_us() {
     static const std::unique_ptr<Clock> clock = host_clock();
     return clock->now_us();
@@ -64,6 +71,10 @@ std::unique_ptr<LinkSession> LinkSession::open(const std::string& link, SessionO
     options.version = RIG_VERSION;
     return std::unique_ptr<LinkSession>(
         new LinkSession(link, std::move(*opened), std::move(options), std::move(events)));
+}
+
+LinkSession::End LinkSession::run_until_ready(double timeout_s) {
+    return run([this] { return session_.phase() == SessionPhase::kReady; }, timeout_s);
 }
 
 LinkSession::End LinkSession::run(const std::function<bool()>& done, double timeout_s, Refusal refusal) {

@@ -16,6 +16,8 @@ namespace rig::host {
 inline constexpr double kAnswerTimeout_s = 5.0;
 
 CLI::Option* add_link_option(CLI::App& verb, std::string& link);
+// --timeout, s; what it is for stands in the help of every verb in the same words.
+CLI::Option* add_timeout_option(CLI::App& verb, double& timeout_s);
 
 // A link and the session over it. Moves neither.
 class LinkSession {
@@ -29,6 +31,8 @@ class LinkSession {
     // Polls until `done`, Ctrl-C, for timeout_s seconds, or until the board refuses the session. Sleeps at
     // most a millisecond at a time, so that the time of reception is good to that.
     End run(const std::function<bool()>& done, double timeout_s, Refusal refusal = Refusal::kEnds);
+    // Until the board has answered.
+    End run_until_ready(double timeout_s);
 
     [[nodiscard]] HostSession& session() { return session_; }
     [[nodiscard]] const std::string& link_text() const { return link_text_; }

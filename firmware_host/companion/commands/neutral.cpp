@@ -68,8 +68,7 @@ int run_neutral(const NeutralOptions& options) {
     };
     const auto link = LinkSession::open(options.link, wanted, std::move(events));
     if (!link) return kExitDevice;
-    const auto end =
-        link->run([&] { return link->session().phase() == SessionPhase::kReady; }, options.timeout_s);
+    const auto end = link->run_until_ready(options.timeout_s);
     if (end != LinkSession::End::kDone) return report_end(end, *link);
     return ask(options, *link, ending);
 }
@@ -81,10 +80,7 @@ void add_neutral_verb(CLI::App& app, int& exit_code) {
     CLI::App* verb = app.add_subcommand("neutral", "Take the face at rest for the neutral one, live");
     add_link_option(*verb, options->link)->required();
     verb->add_flag("--forget", options->forget, "go back to the neutral of the pack");
-    verb->add_option("--timeout", options->timeout_s, "how long to wait for an answer, s")
-        ->capture_default_str()
-        ->check(CLI::Range(0.1, 3600.0))
-        ->type_name("S");
+    add_timeout_option(*verb, options->timeout_s);
     verb->footer(
         "The performer rests for a second; each dot's offset from the pack's neutral is then taken off.\n"
         "Refused, with the reason, when the face moves, holds an expression, is not seen, or a dot is more\n"

@@ -131,13 +131,12 @@ json pack_json(const OpenedPack& opened) {
     }
     for (std::size_t c = 0; c < pack.camera_count; ++c)
         out["cameras"].push_back(json(camera_json(pack.cameras[c])));
-    for (std::size_t i = 0; i < pack.reference_mark_count; ++i) {
-        const HelmetMark& mark = pack.reference_marks[i];
+    for (const HelmetMark& mark : pack.helmet_marks()) {
         out["reference_marks"].push_back(
             {{"headset_mm", {mark.headset_mm[0], mark.headset_mm[1], mark.headset_mm[2]}},
              {"cameras", json::array()}});
         for (std::size_t c = 0; c < pack.camera_count; ++c)
-            if ((mark.cameras >> c & 1) != 0) out["reference_marks"].back()["cameras"].push_back(c);
+            if (mark.is_seen_by(c)) out["reference_marks"].back()["cameras"].push_back(c);
     }
     for (std::size_t r = 0; r < pack.region_count; ++r)
         out["regions"].push_back(region_json(pack, pack.regions[r]));

@@ -14,6 +14,7 @@
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/files/csv.hpp"
 #include "firmware_host/companion/files/npy.hpp"
+#include "firmware_host/companion/replay/offline_pipeline.hpp"
 #include "firmware_host/pack_file/opened_pack.hpp"
 #include "firmware_host/settings/control_settings.hpp"
 #include "firmware_host/settings/settings_file.hpp"
@@ -283,12 +284,12 @@ int run_solve(const SolveOptions& command_line) {
         print_error(config.error());
         return kExitUsage;
     }
-    auto pipeline = std::make_unique<Pipeline>();
-    if (!pipeline->configure(pack, *config)) {
-        print_error(options.pack + ": the solver refuses this pack; train it again with this version");
+    const auto pipeline = offline_pipeline(pack, *config, options.pack);
+    if (!pipeline) {
+        print_error(pipeline.error().message);
         return kExitInput;
     }
-    if (const auto set = set_controls(options, pack, *pipeline); !set) {
+    if (const auto set = set_controls(options, pack, **pipeline); !set) {
         print_error(set.error());
         return kExitUsage;
     }
@@ -299,7 +300,7 @@ int run_solve(const SolveOptions& command_line) {
     results.labels.shape = {stream->shape[0], stream->shape[1]};
     results.points.shape = {stream->shape[0], pack.marker_count, 3};
     install_interrupt_handler();
-    const int code = solve_frames(options, pack, *stream, *pipeline, results);
+    const int code = solve_frames(options, pack, *stream, **pipeline, results);
     if (code != kExitOk) return code;
     if (const auto saved = save_results(options, results); !saved) {
         print_error(saved.error().message);

@@ -57,10 +57,7 @@ void add_status_verb(CLI::App& app, int& exit_code) {
     verb->add_flag("--check", options->check,
                    "exit code 1 when a fault is present or the face is not tracked");
     verb->add_flag("--list-faults", options->list_faults, "what every fault code means; needs no rig");
-    verb->add_option("--timeout", options->timeout_s, "how long to wait for an answer, s")
-        ->capture_default_str()
-        ->check(CLI::Range(0.1, 3600.0))
-        ->type_name("S");
+    add_timeout_option(*verb, options->timeout_s);
     verb->footer(
         "Owns nothing: another host may stream meanwhile.\nExamples:\n  headrig status --link /dev/pts/5\n"
         "  headrig status --link udp:127.0.0.1:7777 --check && echo well\n  headrig status --list-faults\n"

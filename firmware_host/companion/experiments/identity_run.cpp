@@ -5,12 +5,6 @@
 
 namespace rig::host {
 
-namespace {
-
-constexpr double kCentreSigmaPx = 0.15;  // as the pipeline has it
-
-}  // namespace
-
 void IdentityFigures::add(const IdentityFigures& other) {
     frames += other.frames;
     visible += other.visible;

@@ -41,10 +41,6 @@ void shuffle(std::vector<T>& sightings, std::vector<int>& truth, WhiteNoise& ran
     }
 }
 
-Vec3 vector_of(const Float3& x) {
-    return {static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2])};
-}
-
 double between(double low, double high, WhiteNoise& random) {
     return low + (high - low) * random.uniform();
 }
@@ -86,12 +82,12 @@ std::vector<Vec3> face_markers(const MarkerModel& model, const Take& take, std::
 }
 
 std::size_t nearest_neighbour(const MarkerLayout& layout, std::size_t marker) {
-    const Vec3 from = vector_of(layout.markers[marker].neutral_mm);
+    const Vec3 from = point_at(layout.markers[marker].neutral_mm, 0);
     std::size_t nearest = marker == 0 ? 1 : 0;
     for (std::size_t k = 0; k < layout.markers.size(); ++k) {
         if (k == marker) continue;
-        const double gap = (vector_of(layout.markers[k].neutral_mm) - from).norm();
-        if (gap < (vector_of(layout.markers[nearest].neutral_mm) - from).norm()) nearest = k;
+        const double gap = (point_at(layout.markers[k].neutral_mm, 0) - from).norm();
+        if (gap < (point_at(layout.markers[nearest].neutral_mm, 0) - from).norm()) nearest = k;
     }
     return nearest;
 }
@@ -154,7 +150,7 @@ void SightingSource::add_camera(std::size_t at, std::size_t camera, std::span<co
     };
     for (std::size_t k = 0; k < markers_mm.size(); ++k) {
         const Vec3& x = markers_mm[k];
-        const Vec3 outward = pose.rotation * vector_of(scene_.head.layout.markers[k].normal);
+        const Vec3 outward = pose.rotation * point_at(scene_.head.layout.markers[k].normal, 0);
         const Vec3 towards = centre - x;
         if (towards.dot(outward) < kLeastCosine * towards.norm()) continue;
         const PixelAt pixel = see(seen_by, {x[0], x[1], x[2]});

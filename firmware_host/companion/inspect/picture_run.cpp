@@ -11,6 +11,7 @@
 #include "firmware_host/companion/files/image_file.hpp"
 #include "firmware_host/companion/inspect/moment_watch.hpp"
 #include "firmware_host/companion/inspect/take_runs.hpp"
+#include "firmware_host/companion/replay/offline_pipeline.hpp"
 #include "firmware_host/companion/world/helmet.hpp"
 
 namespace rig::host {
@@ -137,16 +138,14 @@ Result<TakeRecord, FileError> inspect_pictures(const InspectRequest& request, co
     const auto take = find_pictures(request, pack, record.rate_hz);
     if (!take) return failure(take.error());
     record.cameras = take->cameras;
-    const auto pipeline = std::make_unique<Pipeline>();
     PipelineConfig config;
     config.filter = false;
     config.stabilise = request.stabilise;
     config.polarity = request.polarity;
     config.rate_hz = record.rate_hz;
-    if (!pipeline->configure(pack, config)) {
-        return failure(FileError{request.pack_name +
-                                 ": the solver refuses this pack; train it again with this version"});
-    }
+    const auto configured = offline_pipeline(pack, config, request.pack_name);
+    if (!configured) return failure(configured.error());
+    Pipeline* const pipeline = configured->get();
     const auto state = std::make_unique<FaceState>();
     const auto report = std::make_unique<FrameReport>();
     std::vector<GreyImage> images(pack.camera_count);

@@ -14,10 +14,7 @@ constexpr double kFrontMargin_mm = 30.0;  // for expressions, slip and ghosts ar
 constexpr double kPointDiameter_px = 9.0;
 
 Rigid headset_from_face(const Slip& slip) {
-    const auto vec = [](const std::array<float, 3>& v) {
-        return Vec3{static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
-    };
-    return {rotation_from_vector(vec(slip.rotation_rad)), vec(slip.translation_mm)};
+    return {rotation_from_vector(point_at(slip.rotation_rad, 0)), point_at(slip.translation_mm, 0)};
 }
 
 // Guesses of markers that the view has no blob for. A tick without a solve has none.

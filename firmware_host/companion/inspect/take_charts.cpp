@@ -12,6 +12,7 @@
 #include "firmware_host/companion/links/session_text.hpp"
 #include "firmware_host/companion/report/data_uri.hpp"
 #include "firmware_host/companion/report/page.hpp"
+#include "firmware_host/companion/report/svg_text.hpp"
 
 namespace rig::host {
 
@@ -36,21 +37,6 @@ constexpr std::array<const char*, 6> kCameraColours{"none",    "#5aa9a0", "#f2b7
                                                     "#b3261e", "#d9773f", "#9a6fc4"};
 constexpr const char* kFaultColour = "#d9773f";
 
-std::string open_svg(double height, std::string_view label) {
-    return fmt::format(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
-        "height=\"{1:.0f}\" role=\"img\" aria-label=\"{2}\" font-family=\"DejaVu Sans, sans-serif\" "
-        "font-size=\"11\">\n",
-        kWidthPx, height, escaped(label));
-}
-
-std::string text_at(double x, double y, std::string_view anchor, std::string_view more,
-                    std::string_view text) {
-    return fmt::format(
-        "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"currentColor\"{}>{}</text>\n", x, y,
-        anchor, more, escaped(text));
-}
-
 std::string rect(double x, double y, double width, double height, std::string_view colour) {
     return fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"{:.1f}\" fill=\"{}\"/>\n",
                        x, y, width, height, colour);
@@ -64,9 +50,9 @@ std::string seconds_axis(double y, double duration_s) {
         const double x = kLeftPx + kPlotPx * tick / duration_s;
         out += fmt::format("<path d=\"M{:.1f} {:.1f}v4\" stroke=\"currentColor\" stroke-opacity=\"0.7\"/>\n",
                            x, y);
-        out += text_at(x, y + 16.0, "middle", "", fmt::format("{:.4g}", tick + 0.0));  // never -0
+        out += text_at(x, y + 16.0, "middle", fmt::format("{:.4g}", tick + 0.0));  // never -0
     }
-    return out + text_at(kLeftPx + 0.5 * kPlotPx, y + 34.0, "middle", "", "time, s");
+    return out + text_at(kLeftPx + 0.5 * kPlotPx, y + 34.0, "middle", "time, s");
 }
 
 struct LegendEntry {
@@ -79,7 +65,7 @@ std::string legend(const std::vector<LegendEntry>& entries) {
     double x = kLeftPx;
     for (const LegendEntry& entry : entries) {
         out += rect(x, 3.0, 10.0, 10.0, entry.colour);
-        out += text_at(x + 15.0, 12.0, "start", "", entry.name);
+        out += text_at(x + 15.0, 12.0, "start", entry.name);
         x += 33.0 + 6.8 * static_cast<double>(entry.name.size());
     }
     return out;
@@ -227,8 +213,8 @@ std::string marker_timeline(const TakeRecord& record) {
     const int height = static_cast<int>(rows.height_px);
     std::vector<std::uint8_t> rgba(4 * bins.count * static_cast<std::size_t>(height), 0);
     for (const TimelineRow& row : rows.rows) paint_row(record, bins, rows, row, rgba);
-    std::string out =
-        open_svg(kLegendRoomPx + rows.height_px + kAxisRoomPx, "visible, inferred and lost markers");
+    std::string out = open_svg(kWidthPx, kLegendRoomPx + rows.height_px + kAxisRoomPx,
+                               "visible, inferred and lost markers");
     out += legend(
         {{"visible", kSightingColours[2]}, {"inferred", kSightingColours[1]}, {"lost", kSightingColours[0]}});
     out += fmt::format(
@@ -237,12 +223,12 @@ std::string marker_timeline(const TakeRecord& record) {
         kLeftPx, kLegendRoomPx, kPlotPx, height,
         data_uri("image/png", encode_rgba_png(static_cast<int>(bins.count), height, rgba)));
     for (const TimelineRow& row : rows.rows) {
-        out += text_at(kLeftPx - 6.0, kLegendRoomPx + row.y_px + rows.row_px - 2.0, "end", " font-size=\"8\"",
-                       shortened(record.markers[row.marker].name, 14));
+        out += text_at(kLeftPx - 6.0, kLegendRoomPx + row.y_px + rows.row_px - 2.0, "end",
+                       shortened(record.markers[row.marker].name, 14), " font-size=\"8\"");
     }
     for (const auto& [y, region] : rows.regions) {
-        out += text_at(kLeftPx, kLegendRoomPx + y + kRegionRoomPx - 4.0, "start",
-                       " font-weight=\"600\" font-size=\"9\"", region_name(region));
+        out += text_at(kLeftPx, kLegendRoomPx + y + kRegionRoomPx - 4.0, "start", region_name(region),
+                       " font-weight=\"600\" font-size=\"9\"");
     }
     return out + seconds_axis(kLegendRoomPx + rows.height_px + 2.0, bins.duration_s) + "</svg>\n";
 }
@@ -252,7 +238,7 @@ std::string state_ribbons(const TakeRecord& record) {
     const TimeBins bins = time_bins(record);
     const double height =
         kLegendRoomPx + kRowPx * static_cast<double>(1 + record.cameras.size()) + kAxisRoomPx;
-    std::string out = open_svg(height, "tracking state and cameras over time");
+    std::string out = open_svg(kWidthPx, height, "tracking state and cameras over time");
     std::vector<LegendEntry> entries;
     for (int s = 4; s >= 0; --s)
         entries.push_back({std::string(state_word(static_cast<TrackingState>(s))),
@@ -268,7 +254,7 @@ std::string state_ribbons(const TakeRecord& record) {
     const auto states = cells_of(
         record, bins, [](const TakeTick& tick) { return static_cast<int>(tick.state); },
         [](int a, int b) { return a < b; });
-    out += text_at(kLeftPx - 6.0, kLegendRoomPx + 12.0, "end", "", "state");
+    out += text_at(kLeftPx - 6.0, kLegendRoomPx + 12.0, "end", "state");
     out += ribbon(states, kLegendRoomPx, kRowPx - 3.0, kStateColours);
     double y = kLegendRoomPx + kRowPx;
     for (std::size_t c = 0; c < record.cameras.size() && c < kMaxCameras; ++c, y += kRowPx) {
@@ -278,7 +264,7 @@ std::string state_ribbons(const TakeRecord& record) {
                 return tick.cameras[c] == CameraStatus::kUnused ? -1 : static_cast<int>(tick.cameras[c]);
             },
             [](int a, int b) { return a != 1 && (b == 1 || a > b); });
-        out += text_at(kLeftPx - 6.0, y + 12.0, "end", "", shortened("camera " + record.cameras[c], 18));
+        out += text_at(kLeftPx - 6.0, y + 12.0, "end", shortened("camera " + record.cameras[c], 18));
         out += ribbon(cells, y, kRowPx - 3.0, kCameraColours);
     }
     return out + seconds_axis(y, bins.duration_s) + "</svg>\n";
@@ -287,7 +273,8 @@ std::string state_ribbons(const TakeRecord& record) {
 std::string fault_ribbons(const TakeRecord& record, const std::vector<FaultSummary>& faults) {
     constexpr double kRowPx = 32.0;
     const TimeBins bins = time_bins(record);
-    std::string out = open_svg(kRowPx * static_cast<double>(faults.size()) + kAxisRoomPx, "faults over time");
+    std::string out =
+        open_svg(kWidthPx, kRowPx * static_cast<double>(faults.size()) + kAxisRoomPx, "faults over time");
     double y = 0.0;
     constexpr std::array<const char*, 1> kOneColour{kFaultColour};
     for (const FaultSummary& fault : faults) {
@@ -295,8 +282,8 @@ std::string fault_ribbons(const TakeRecord& record, const std::vector<FaultSumma
             record, bins,
             [&](const TakeTick& tick) { return ((tick.faults >> (fault.number - 1)) & 1U) != 0 ? 0 : -1; },
             [](int, int) { return false; });
-        out += text_at(kLeftPx - 6.0, y + 25.0, "end", " font-weight=\"600\"", fault_code(fault.number));
-        out += text_at(kLeftPx, y + 12.0, "start", "", fault_text(fault.number));
+        out += text_at(kLeftPx - 6.0, y + 25.0, "end", fault_code(fault.number), " font-weight=\"600\"");
+        out += text_at(kLeftPx, y + 12.0, "start", fault_text(fault.number));
         out += fmt::format(
             "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"11\" fill=\"currentColor\" "
             "fill-opacity=\"0.08\"/>\n",

@@ -11,6 +11,7 @@
 
 #include "firmware_host/companion/files/npy.hpp"
 #include "firmware_host/companion/inspect/moment_watch.hpp"
+#include "firmware_host/companion/replay/offline_pipeline.hpp"
 #include "firmware_host/companion/replay/replay_log.hpp"
 
 namespace rig::host {
@@ -125,24 +126,20 @@ Result<TakeRecord, FileError> inspect_stream(const InspectRequest& request, cons
         request.take, pack, request.unlabelled ? "marker stream without names" : "marker stream with names");
     record.rate_hz = request.rate_hz > 0.0 ? request.rate_hz : static_cast<double>(pack.rate_hz);
     record.counts_ghosts = request.unlabelled;
-    const auto pipeline = std::make_unique<Pipeline>();
     PipelineConfig config;
     config.filter = false;
     config.stabilise = request.stabilise;
     config.rate_hz = record.rate_hz;
-    if (!pipeline->configure(pack, config)) {
-        return failure(FileError{request.pack_name +
-                                 ": the solver refuses this pack; train it again with this version"});
-    }
+    const auto configured = offline_pipeline(pack, config, request.pack_name);
+    if (!configured) return failure(configured.error());
+    Pipeline* const pipeline = configured->get();
     const auto state = std::make_unique<FaceState>();
     const auto report = std::make_unique<FrameReport>();
     MomentWatch watch;
     std::vector<Vec3> positions(stream->shape[1]);
     for (std::size_t frame = 0; frame < stream->shape[0]; ++frame) {
         for (std::size_t s = 0; s < positions.size(); ++s) {
-            const float* at = stream->values.data() + (frame * positions.size() + s) * 3;
-            positions[s] = {static_cast<double>(at[0]), static_cast<double>(at[1]),
-                            static_cast<double>(at[2])};
+            positions[s] = point_at(stream->values, frame * positions.size() + s);
         }
         const double time_s = static_cast<double>(frame) / record.rate_hz;
         const auto capture_us = static_cast<std::int64_t>(std::llround(time_s * 1e6));

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "firmware_host/companion/files/whole_file.hpp"
+#include "firmware_host/companion/replay/offline_pipeline.hpp"
 #include "firmware_host/take_log/observation_log.hpp"
 #include "firmware_host/take_log/stream_digest.hpp"
 
@@ -67,13 +68,11 @@ Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const O
     auto reader = ObservationLogReader::open(*bytes);
     if (!reader) return failure(FileError{request.log.string() + ": " + fault_of(reader.error())});
     if (const auto fits = check_fit(request, pack, reader->header()); !fits) return failure(fits.error());
-    const auto pipeline = std::make_unique<Pipeline>();
     PipelineConfig config = config_of(reader->header());
     config.filter = config.filter && !request.as_solved;
-    if (!pipeline->configure(pack.pack(), config)) {
-        return failure(FileError{request.pack_name +
-                                 ": the solver refuses this pack; train it again with this version"});
-    }
+    const auto configured = offline_pipeline(pack.pack(), config, request.pack_name);
+    if (!configured) return failure(configured.error());
+    Pipeline* const pipeline = configured->get();
     const auto state = std::make_unique<FaceState>();
     const auto report = std::make_unique<FrameReport>();
     StreamDigest digest;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "firmware_host/companion/report/page.hpp"
+#include "firmware_host/companion/report/svg_text.hpp"
 
 namespace rig::host {
 
@@ -22,19 +23,6 @@ constexpr double kEventsPx = 12.0;
 constexpr std::array kColours{"#3b82c4", "#d9773f", "#3f9e6b", "#9a6fc4", "#b8952b", "#8a8a8a"};
 constexpr std::string_view kAxis = "stroke=\"currentColor\" stroke-opacity=\"0.7\"";
 constexpr std::string_view kGrid = "stroke=\"currentColor\" stroke-opacity=\"0.15\"";
-
-std::string open_svg(double width, double height, std::string_view label) {
-    return fmt::format(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.0f} {:.0f}\" width=\"{:.0f}\" "
-        "height=\"{:.0f}\" role=\"img\" aria-label=\"{}\" font-family=\"DejaVu Sans, sans-serif\" "
-        "font-size=\"11\">\n",
-        width, height, width, height, escaped(label));
-}
-
-std::string text_at(double x, double y, std::string_view anchor, std::string_view text) {
-    return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"currentColor\">{}</text>\n",
-                       x, y, anchor, escaped(text));
-}
 
 std::string line_between(double x0, double y0, double x1, double y1, std::string_view style) {
     return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" {}/>\n", x0, y0, x1, y1,
