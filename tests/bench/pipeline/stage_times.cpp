@@ -17,8 +17,7 @@ namespace {
 
 constexpr std::size_t kCameras = 2;
 constexpr std::size_t kMarkers = 60;
-constexpr double kDotMm = 4.0;           // painted
-constexpr double kCentreSigmaPx = 0.15;  // as the pipeline takes it
+constexpr double kDotMm = 4.0;  // painted
 constexpr double kRateHz = 60.0;
 
 enum Stage : std::size_t { kDetect, kTrack, kStabilise, kInfer, kSolve, kRest, kAll, kStages };
@@ -97,8 +96,7 @@ class StageChain {
             last_us = now_us;
         };
         for (std::size_t c = 0; c < kCameras; ++c) {
-            seen_[c].clear();
-            detectors_[c].detect(pictures[c].view(), seen_[c], detected_);
+            find_markers(c, pictures[c].view());
         }
         lap(kDetect);
         sightings_.clear();
@@ -120,12 +118,26 @@ class StageChain {
     }
 
   private:
+    // A tracked face in windows, as in most frames of the pipeline.
+    void find_markers(std::size_t camera, const ImageView& image) {
+        expected_.clear();
+        if (tracker_.tracking) {
+            const MarkerPrediction prediction{
+                predict_markers(model_, tracker_config_, tracker_, tracker_workspace_),
+                std::span(tracker_.missed).first(pack_.marker_count),
+                std::span(tracked_.matches[camera]).first(pack_.marker_count)};
+            expect_markers(pack_.cameras[camera], camera, prediction, {}, expected_);
+        }
+        detectors_[camera].detect_around(image, expected_.span(), seen_[camera], detected_);
+    }
+
     SolvePack pack_;
     bool ok_ = false;
     ShapeModel model_;
     FaceGaussian gaussian_;
     std::array<Detector, kCameras> detectors_;
     std::array<Observations, kCameras> seen_;
+    ExpectedMarkers expected_;
     DetectorReport detected_;
     SightingSet sightings_;
     TrackerConfig tracker_config_;
