@@ -28,6 +28,13 @@ Vec3 point_on_face(double u, double v) {  // u, v in [-1, 1]: left to right and 
 
 }  // namespace
 
+std::unique_ptr<ShapeModel> shape_model_of(const SolvePack& pack) {
+    auto model = std::make_unique<ShapeModel>();
+    const auto workspace = std::make_unique<ShapeModelWorkspace>();
+    build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *workspace, *model);
+    return model;
+}
+
 SyntheticFace::SyntheticFace(const SyntheticFaceOptions& options) : options_(options) {
     SeededRandom random(options.seed);
     place_markers(random);

@@ -6,12 +6,14 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/base/linalg.hpp"
 #include "core/detect/observation.hpp"
+#include "core/geometry/shape_model.hpp"
 #include "core/pack/solve_pack.hpp"
 #include "tests/support/random.hpp"
 
@@ -30,6 +32,9 @@ struct SyntheticFaceOptions {
     SolverKind solver = SolverKind::kBoxQp;
     std::uint64_t seed = 1;
 };
+
+// The shape model of a pack's basis and priors.
+[[nodiscard]] std::unique_ptr<ShapeModel> shape_model_of(const SolvePack& pack);
 
 class SyntheticFace {
   public:

@@ -18,9 +18,12 @@
 #include "hal/linux/pty_link.hpp"
 #include "hal/linux/udp_link.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/support/text_checks.hpp"
 #include "tests/support/wire/simulated_board.hpp"
 
 namespace {
+
+using rig::test::has;
 
 using namespace rig;
 
@@ -105,10 +108,6 @@ class LinkVerbs : public testing::Test {
         _exit(127);
     }
 };
-
-bool has(const std::string& text, std::string_view part) {
-    return text.find(part) != std::string::npos;
-}
 
 TEST_F(LinkVerbs, InfoTellsWhoIsThere) {
     const auto board = board_on_pty({.clock_ahead_us = 5'000'000});

@@ -15,10 +15,7 @@ namespace {
 
 struct Fixture {
     explicit Fixture(const test::SyntheticFaceOptions& options) : face(options) {
-        const SolvePack pack = face.pack();
-        auto scratch = std::make_unique<ShapeModelWorkspace>();
-        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
-                          *model);
+        model = test::shape_model_of(face.pack());
     }
 
     // Fit to positions; `seen` empty means all.
@@ -40,7 +37,7 @@ struct Fixture {
     }
 
     test::SyntheticFace face;
-    std::unique_ptr<ShapeModel> model = std::make_unique<ShapeModel>();
+    std::unique_ptr<ShapeModel> model;
 };
 
 test::SyntheticFaceOptions options(std::size_t markers, std::size_t shapes, std::uint64_t seed) {

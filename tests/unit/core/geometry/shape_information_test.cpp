@@ -15,10 +15,7 @@ namespace {
 
 struct Scene {
     explicit Scene(std::size_t shapes) : face(options(shapes)) {
-        const SolvePack pack = face.pack();
-        auto scratch = std::make_unique<ShapeModelWorkspace>();
-        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
-                          *model);
+        model = test::shape_model_of(face.pack());
         for (std::size_t k = 0; k < model->marker_count; ++k) positions.push_back(model->mean_mm[k]);
     }
     static test::SyntheticFaceOptions options(std::size_t shapes) {
@@ -81,7 +78,7 @@ struct Scene {
 
     test::SyntheticFace face;
     test::SeededRandom random{62};
-    std::unique_ptr<ShapeModel> model = std::make_unique<ShapeModel>();
+    std::unique_ptr<ShapeModel> model;
     std::unique_ptr<ShapeInformation> information = std::make_unique<ShapeInformation>();
     Mat3 rotation = rotation_from_vector(Vec3{0.05, -0.1, 0.03});
     std::vector<Vec3> positions;

@@ -12,9 +12,7 @@ namespace rig {
 namespace {
 
 std::unique_ptr<FaceGaussian> built(const SolvePack& pack) {
-    auto model = std::make_unique<ShapeModel>();
-    auto shapes = std::make_unique<ShapeModelWorkspace>();
-    build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *shapes, *model);
+    const auto model = test::shape_model_of(pack);
     auto workspace = std::make_unique<FaceGaussianWorkspace>();
     auto face = std::make_unique<FaceGaussian>();
     build_face_gaussian(pack, *model, *workspace, *face);

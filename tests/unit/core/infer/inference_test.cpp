@@ -15,9 +15,7 @@ namespace {
 struct Scene {
     Scene() {
         const SolvePack pack = face.pack();
-        auto scratch = std::make_unique<ShapeModelWorkspace>();
-        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
-                          *model);
+        model = test::shape_model_of(pack);
         auto gaussian_scratch = std::make_unique<FaceGaussianWorkspace>();
         build_face_gaussian(pack, *model, *gaussian_scratch, *gaussian);
         reset_inference(*inference);
@@ -39,7 +37,7 @@ struct Scene {
     test::SyntheticFace face{{}};
     StabiliserConfig config;
     StabiliserReport report;
-    std::unique_ptr<ShapeModel> model = std::make_unique<ShapeModel>();
+    std::unique_ptr<ShapeModel> model;
     std::unique_ptr<FaceGaussian> gaussian = std::make_unique<FaceGaussian>();
     std::unique_ptr<InferenceWorkspace> inference = std::make_unique<InferenceWorkspace>();
     std::unique_ptr<StabiliserState> state = std::make_unique<StabiliserState>();

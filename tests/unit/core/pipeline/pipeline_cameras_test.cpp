@@ -171,15 +171,7 @@ TEST(Pipeline, CamerasThatStandTellTheHeadsPoseAndNoSlip) {
         const Rigid head{rotation_from_vector(Vec3{0.12 * std::sin(2.0 * t), 0.25 * std::sin(1.3 * t), 0.0}),
                          Vec3{12.0 * std::sin(0.9 * t), 8.0 * std::sin(1.7 * t), 5.0 * std::sin(t)}};
         const std::vector<Vec3> truth = test::moved(head, s.face.positions(s.face.weights_at(t)));
-        std::array<test::SyntheticFace::View, 2> views;
-        ObservationFrame frame;
-        frame.capture_us = s.now();
-        frame.camera_count = 2;
-        for (std::size_t c = 0; c < 2; ++c) {
-            views[c] = s.face.observe(c, truth, 0.1, 0.0, 0, s.random);
-            frame.status[c] = CameraStatus::kGood;
-            frame.cameras[c] = views[c].observations;
-        }
+        const ObservationFrame frame = s.observed(truth);
         s.pipeline->step(frame, s.state, s.report);
         ++s.frame;
         EXPECT_EQ(s.state.faults & fault_bit(Fault::kRigMoved), 0U);

@@ -35,6 +35,18 @@ struct PipelineScene {
         pipeline->step(LabelledFrame{now(), points}, state, report);
         after();
     }
+    // What the first two cameras observe of it; valid until the next call.
+    [[nodiscard]] ObservationFrame observed(const std::vector<Vec3>& points) {
+        ObservationFrame seen;
+        seen.capture_us = now();
+        seen.camera_count = 2;
+        for (std::size_t c = 0; c < 2; ++c) {
+            views_[c] = face.observe(c, points, 0.1, 0.0, 0, random);
+            seen.status[c] = CameraStatus::kGood;
+            seen.cameras[c] = views_[c].observations;
+        }
+        return seen;
+    }
     void idle() {
         pipeline->idle(now(), state, report);
         after();
@@ -69,6 +81,7 @@ struct PipelineScene {
         before_ = state.weights;
     }
     std::array<float, kMaxShapes> before_{};
+    std::array<SyntheticFace::View, 2> views_;
 };
 
 }  // namespace rig::test

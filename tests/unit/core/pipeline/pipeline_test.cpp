@@ -311,15 +311,7 @@ TEST(Pipeline, ACameraThatIsGoneMakesItPartial) {
         const bool gone = i >= 20 && i < 30;
         const double time_s = i / 60.0;
         const std::vector<Vec3> truth = s.face.positions(s.face.weights_at(time_s));
-        std::array<test::SyntheticFace::View, 2> views;
-        ObservationFrame frame;
-        frame.capture_us = s.now();
-        frame.camera_count = 2;
-        for (std::size_t c = 0; c < 2; ++c) {
-            views[c] = s.face.observe(c, truth, 0.1, 0.0, 0, s.random);
-            frame.status[c] = CameraStatus::kGood;
-            frame.cameras[c] = views[c].observations;
-        }
+        ObservationFrame frame = s.observed(truth);
         if (gone) {
             frame.status[1] = CameraStatus::kGone;
             frame.cameras[1] = {};

@@ -18,10 +18,7 @@ constexpr double kNoiseMm = 0.1;
 class GluedFace {
   public:
     explicit GluedFace(double aside_mm) : face_({}) {
-        const SolvePack pack = face_.pack();
-        auto scratch = std::make_unique<ShapeModelWorkspace>();
-        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
-                          *model_);
+        model_ = test::shape_model_of(face_.pack());
         for (std::size_t k = 0; k < face_.marker_count(); ++k) {
             Vec3 way{random_.normal(0.0, 1.0), random_.normal(0.0, 1.0), random_.normal(0.0, 1.0)};
             aside.push_back(aside_mm * way.normalized());
@@ -78,7 +75,7 @@ class GluedFace {
   private:
     test::SyntheticFace face_;
     test::SeededRandom random_{717};
-    std::unique_ptr<ShapeModel> model_ = std::make_unique<ShapeModel>();
+    std::unique_ptr<ShapeModel> model_;
     std::unique_ptr<NamedMarkers> named_ = std::make_unique<NamedMarkers>();
     std::unique_ptr<StabiliserState> stabiliser_ = std::make_unique<StabiliserState>();
     std::unique_ptr<StabiliserWorkspace> workspace_ = std::make_unique<StabiliserWorkspace>();
@@ -186,55 +183,58 @@ TEST(NeutralCapture, RefusesWhenTooLittleIsSeen) {
     EXPECT_EQ(glued.report.value, 0.0);
 }
 
+// Four markers at the origin, and a second of what one tells of them.
+struct FourMarkers {
+    FourMarkers() {
+        model.marker_count = 4;
+        stabilised.count = 4;
+        begin_neutral(state);
+    }
+    void see(std::size_t k, const Vec3& at_mm, const Mat3& information) {
+        stabilised.markers[k].seen = true;
+        stabilised.markers[k].position_mm = at_mm;
+        stabilised.markers[k].information = information;
+    }
+    void watch() { watch_neutral(model, neutral, 0.1, {}, &stabilised, state, report); }
+
+    ShapeModel model;
+    std::vector<float> neutral = std::vector<float>(12, 0.0F);
+    StabiliserOutput stabilised;
+    NeutralState state;
+    NeutralReport report;
+};
+
 // One camera knows nothing of the depth, so nothing is learnt along its ray.
 TEST(NeutralCapture, LearnsNothingWhereNothingWasMeasured) {
-    NeutralState state;
-    StabiliserOutput stabilised;
-    ShapeModel model;
-    model.marker_count = 4;
-    const std::vector<float> neutral(12, 0.0F);
-    stabilised.count = 4;
-    for (std::size_t k = 0; k < 4; ++k) {
-        stabilised.markers[k].seen = true;
-        stabilised.markers[k].position_mm = Vec3{0.5, -0.25, 1.0};
-        stabilised.markers[k].information = Vec3{100.0, 100.0, 0.0}.asDiagonal();
-    }
-    NeutralReport report;
-    begin_neutral(state);
-    for (int i = 0; i < 60; ++i) watch_neutral(model, neutral, 0.1, {}, &stabilised, state, report);
-    ASSERT_EQ(report.phase, NeutralPhase::kTaken);
+    const auto face = std::make_unique<FourMarkers>();
+    for (std::size_t k = 0; k < 4; ++k)
+        face->see(k, Vec3{0.5, -0.25, 1.0}, Vec3{100.0, 100.0, 0.0}.asDiagonal());
+    for (int i = 0; i < 60; ++i) face->watch();
+    ASSERT_EQ(face->report.phase, NeutralPhase::kTaken);
     const double learnt = 100.0 / 100.2;  // a thousandth of all that is known pulls to zero
-    EXPECT_NEAR(state.offset_mm[2][0], 0.5 * learnt, 1e-9);
-    EXPECT_NEAR(state.offset_mm[2][1], -0.25 * learnt, 1e-9);
-    EXPECT_NEAR(state.offset_mm[2][2], 0.0, 1e-9);
+    EXPECT_NEAR(face->state.offset_mm[2][0], 0.5 * learnt, 1e-9);
+    EXPECT_NEAR(face->state.offset_mm[2][1], -0.25 * learnt, 1e-9);
+    EXPECT_NEAR(face->state.offset_mm[2][2], 0.0, 1e-9);
 }
 
 // A face that breathes turns under its rays: a milliradian of that is no knowledge of depth.
 TEST(NeutralCapture, RaysThatTurnALittleTeachNoDepth) {
     test::SeededRandom random(5);
     for (const double tilt_rad : {1e-4, 1e-3, 3e-3}) {
-        NeutralState state;
-        StabiliserOutput stabilised;
-        ShapeModel model;
-        model.marker_count = 4;
-        const std::vector<float> neutral(12, 0.0F);
-        stabilised.count = 4;
-        NeutralReport report;
-        begin_neutral(state);
+        const auto face = std::make_unique<FourMarkers>();
         for (int i = 0; i < 60; ++i) {
             for (std::size_t k = 0; k < 4; ++k) {
                 const Vec3 ray =
                     Vec3{random.normal(0.0, tilt_rad), random.normal(0.0, tilt_rad), 1.0}.normalized();
                 const Vec3 noise{random.normal(0.0, 0.1), random.normal(0.0, 0.1), 0.0};
-                stabilised.markers[k].seen = true;
-                stabilised.markers[k].position_mm = noise - noise.dot(ray) * ray;
-                stabilised.markers[k].information = 100.0 * (Mat3::Identity() - ray * ray.transpose());
+                face->see(k, noise - noise.dot(ray) * ray,
+                          100.0 * (Mat3::Identity() - ray * ray.transpose()));
             }
-            watch_neutral(model, neutral, 0.1, {}, &stabilised, state, report);
+            face->watch();
         }
-        ASSERT_EQ(report.phase, NeutralPhase::kTaken) << tilt_rad;
+        ASSERT_EQ(face->report.phase, NeutralPhase::kTaken) << tilt_rad;
         for (std::size_t k = 0; k < 4; ++k) {
-            EXPECT_LT(std::abs(state.offset_mm[k][2]), 0.2) << tilt_rad;
+            EXPECT_LT(std::abs(face->state.offset_mm[k][2]), 0.2) << tilt_rad;
         }
     }
 }

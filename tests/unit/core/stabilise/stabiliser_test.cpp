@@ -16,10 +16,7 @@ namespace {
 
 struct Scene {
     explicit Scene(const test::SyntheticFaceOptions& options = {}) : face(options) {
-        const SolvePack pack = face.pack();
-        auto scratch = std::make_unique<ShapeModelWorkspace>();
-        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
-                          *model);
+        model = test::shape_model_of(face.pack());
     }
 
     void run(const std::vector<Vec3>& headset_mm, double sigma_mm, double hide = 0.0) {
@@ -37,7 +34,7 @@ struct Scene {
 
     test::SyntheticFace face;
     StabiliserConfig config;
-    std::unique_ptr<ShapeModel> model = std::make_unique<ShapeModel>();
+    std::unique_ptr<ShapeModel> model;
     std::unique_ptr<StabiliserState> state = std::make_unique<StabiliserState>();
     std::unique_ptr<StabiliserWorkspace> workspace = std::make_unique<StabiliserWorkspace>();
     std::unique_ptr<NamedMarkers> named = std::make_unique<NamedMarkers>();

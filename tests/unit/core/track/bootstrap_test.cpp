@@ -14,10 +14,7 @@ namespace {
 
 struct Scene {
     explicit Scene(const test::SyntheticFaceOptions& options) : face(options) {
-        const SolvePack pack = face.pack();
-        auto scratch = std::make_unique<ShapeModelWorkspace>();
-        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
-                          *model);
+        model = test::shape_model_of(face.pack());
     }
 
     // Frames until found, or 0 when not within `frames`.
@@ -40,7 +37,7 @@ struct Scene {
     }
 
     test::SyntheticFace face;
-    std::unique_ptr<ShapeModel> model = std::make_unique<ShapeModel>();
+    std::unique_ptr<ShapeModel> model;
     std::unique_ptr<SightingSet> sightings = std::make_unique<SightingSet>();
     std::unique_ptr<BootstrapWorkspace> workspace = std::make_unique<BootstrapWorkspace>();
     std::unique_ptr<ShapeFit> fit = std::make_unique<ShapeFit>();

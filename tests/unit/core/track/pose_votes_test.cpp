@@ -17,10 +17,7 @@ constexpr double kTwentyFiveDegrees = 0.436;
 
 struct Scene {
     explicit Scene(const test::SyntheticFaceOptions& options) : face(options) {
-        const SolvePack pack = face.pack();
-        const auto scratch = std::make_unique<ShapeModelWorkspace>();
-        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
-                          *model);
+        model = test::shape_model_of(face.pack());
     }
     void vote(double range_rad) {
         vote_for_poses(*model, {range_rad, 0.5 * range_rad, 20.0}, Rigid{}, *sightings, *workspace,
@@ -38,7 +35,7 @@ struct Scene {
     }
 
     test::SyntheticFace face;
-    std::unique_ptr<ShapeModel> model = std::make_unique<ShapeModel>();
+    std::unique_ptr<ShapeModel> model;
     std::unique_ptr<SightingSet> sightings = std::make_unique<SightingSet>();
     std::unique_ptr<PoseVotesWorkspace> workspace = std::make_unique<PoseVotesWorkspace>();
     Candidates candidates;

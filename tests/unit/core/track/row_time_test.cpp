@@ -25,10 +25,7 @@ class RollingScene {
   public:
     RollingScene(double row_time_us, double speed, double sigma_px)
         : face_({.camera_count = 2}), row_time_us_(row_time_us), speed_(speed), sigma_px_(sigma_px) {
-        const SolvePack pack = face_.pack();
-        auto scratch = std::make_unique<ShapeModelWorkspace>();
-        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
-                          *model_);
+        model_ = test::shape_model_of(face_.pack());
     }
 
     Errors run(bool correct_rows, int frames) {
@@ -99,7 +96,7 @@ class RollingScene {
     double row_time_us_;
     double speed_;
     double sigma_px_;
-    std::unique_ptr<ShapeModel> model_ = std::make_unique<ShapeModel>();
+    std::unique_ptr<ShapeModel> model_;
     std::unique_ptr<SightingSet> sightings_ = std::make_unique<SightingSet>();
     std::unique_ptr<TrackerState> state_ = std::make_unique<TrackerState>();
     std::unique_ptr<TrackerWorkspace> workspace_ = std::make_unique<TrackerWorkspace>();

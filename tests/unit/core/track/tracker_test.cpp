@@ -16,10 +16,7 @@ const Vec3 kNowhere{std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0};
 
 struct Scene {
     explicit Scene(const test::SyntheticFaceOptions& options = {}) : face(options) {
-        const SolvePack pack = face.pack();
-        auto scratch = std::make_unique<ShapeModelWorkspace>();
-        build_shape_model(pack.neutral_mm, pack.basis_mm, pack.prior_mean, pack.prior_sigma, *scratch,
-                          *model);
+        model = test::shape_model_of(face.pack());
     }
 
     std::vector<Vec3> truth_at(double time_s) const {
@@ -37,7 +34,7 @@ struct Scene {
 
     test::SyntheticFace face;
     TrackerConfig config;
-    std::unique_ptr<ShapeModel> model = std::make_unique<ShapeModel>();
+    std::unique_ptr<ShapeModel> model;
     std::unique_ptr<SightingSet> sightings = std::make_unique<SightingSet>();
     std::unique_ptr<TrackerState> state = std::make_unique<TrackerState>();
     std::unique_ptr<TrackerWorkspace> workspace = std::make_unique<TrackerWorkspace>();

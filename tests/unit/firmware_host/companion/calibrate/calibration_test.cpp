@@ -8,9 +8,12 @@
 #include <string>
 
 #include "tests/support/board_scene/board_scene.hpp"
+#include "tests/support/text_checks.hpp"
 
 namespace rig::host {
 namespace {
+
+using test::has;
 
 BoardSpec board_of(const char* text) {
     const auto board = parse_board(text);
@@ -173,10 +176,6 @@ class ComputedPoints : public testing::Test {
     std::vector<CameraModel> truth;
     CalibrationTask task;
 };
-
-bool has(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
-}
 
 TEST_F(ComputedPoints, AreCalibratedToTheirNoise) {
     const auto found = calibrate(task, [](double) {});

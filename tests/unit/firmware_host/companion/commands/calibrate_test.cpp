@@ -11,9 +11,12 @@
 #include "firmware_host/companion/train/camera_file.hpp"
 #include "tests/support/board_scene/board_scene.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/support/text_checks.hpp"
 #include "tests/unit/firmware_host/companion/commands/verb_run.hpp"
 
 namespace {
+
+using rig::test::has;
 
 using namespace rig;
 namespace fs = std::filesystem;
@@ -23,10 +26,6 @@ constexpr const char* kBoard = "charuco:9x7:12";
 test::VerbOutcome run(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"calibrate", "cameras"});
     return test::run_verb(host::add_calibrate_verb, std::move(arguments));
-}
-
-bool has(const std::string& text, const std::string& part) {
-    return text.find(part) != std::string::npos;
 }
 
 // Two cameras, eight moments, drawn once for all tests of this file.

@@ -1,4 +1,5 @@
 #include "firmware_host/companion/inspect/inspect_page.hpp"
+#include "tests/support/text_checks.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +8,7 @@
 namespace rig::host {
 namespace {
 
-bool has(const std::string& html, std::string_view part) {
-    return html.find(part) != std::string::npos;
-}
+using test::has;
 
 // Ten minutes of 102 markers at 60 Hz where everything happens: bursts of hidden markers, noise, losses.
 TakeRecord long_record() {

@@ -7,16 +7,12 @@
 #include <numeric>
 
 #include "tests/support/random.hpp"
+#include "tests/support/text_checks.hpp"
 
 namespace rig::host {
 namespace {
 
-std::size_t count_of(std::string_view text, std::string_view part) {
-    std::size_t count = 0;
-    for (std::size_t at = text.find(part); at != std::string_view::npos; at = text.find(part, at + 1))
-        ++count;
-    return count;
-}
+using test::count_of;
 
 void expect_whole(const std::string& svg) {
     EXPECT_TRUE(svg.starts_with("<svg "));

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/pack_samples/tiny_rig.hpp"
+#include "tests/support/text_checks.hpp"
 
 namespace rig::host {
 namespace {
+
+using test::has;
 
 std::string page_of(const TrainedPack& pack, const Take* take, bool with_training) {
     const SolvePack view = pack.view();
@@ -15,10 +18,6 @@ std::string page_of(const TrainedPack& pack, const Take* take, bool with_trainin
     if (with_training && pack.report.rbf)
         record = TrainingRecord{"0", *pack.report.rbf, *pack.report.coverage, pack.shape_names};
     return pack_page({.name = "a <face> & \"b\"", .pack = view, .analysis = *analysis, .training = record});
-}
-
-bool has(const std::string& html, std::string_view part) {
-    return html.find(part) != std::string::npos;
 }
 
 TEST(PackPage, NamesAreData) {

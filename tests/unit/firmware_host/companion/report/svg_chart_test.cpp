@@ -8,19 +8,15 @@
 #include <string_view>
 
 #include "tests/support/random.hpp"
+#include "tests/support/text_checks.hpp"
 
 namespace rig::host {
 namespace {
 
+using test::count_of;
+
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-std::size_t count_of(std::string_view text, std::string_view part) {
-    std::size_t count = 0;
-    for (std::size_t at = text.find(part); at != std::string_view::npos; at = text.find(part, at + 1))
-        ++count;
-    return count;
-}
 
 // Every element that is opened is closed, and no number is missing.
 void expect_whole(const std::string& svg) {
