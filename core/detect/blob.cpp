@@ -489,6 +489,7 @@ void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, c
         blob.rejection = Rejection::kSmall;
         return;
     }
+    moments = without_blur(moments);
     set_axes(moments, w.left, w.top, blob);
     blob.deviation = outline_deviation_px(w, moments, mean_radius_px(blob));
     blob.open = open_part(w);

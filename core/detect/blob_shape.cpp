@@ -8,6 +8,7 @@ namespace rig {
 
 namespace {
 
+constexpr double kMostBlurPx2 = 0.5;    // an edge some 3 px wide; more is shape and no blur
 constexpr double kAspectBadness = 0.3;  // of the flattest disc
 constexpr double kNoiseDeviationPx =
     1.5;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
@@ -15,6 +16,20 @@ constexpr double kSureSnr = 6.0;   // contrast / spread of the surroundings: les
 constexpr double kLeastSnr = 2.5;  // below: no telling it from noise
 
 }  // namespace
+
+SoftMoments without_blur(SoftMoments m) {
+    constexpr double kFourPi = 12.566370614359172;
+    const double quarter_axes = m.weight / kFourPi;  // product of both, squared below
+    const double mean = 0.5 * (m.xx + m.yy);
+    const double excess = m.xx * m.yy - m.xy * m.xy - quarter_axes * quarter_axes;
+    if (!(excess > 0.0)) return m;
+    // The lesser root of (xx - c)(yy - c) - xy^2 = quarter_axes^2.
+    const double c = mean - sqrt(std::max(0.0, mean * mean - excess));
+    const double taken = std::min(c, kMostBlurPx2);
+    m.xx -= taken;
+    m.yy -= taken;
+    return m;
+}
 
 void set_axes(const SoftMoments& m, int left, int top, Blob& blob) {
     const double mean = 0.5 * (m.xx + m.yy);

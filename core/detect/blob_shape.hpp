@@ -15,6 +15,9 @@ struct SoftMoments {
     double yy = 0.0;
 };
 
+// A soft edge adds the same variance in every direction: it makes small or flat markers look larger and
+// rounder than their outline. Taken off until the ellipse of these moments has the area of the weights.
+[[nodiscard]] SoftMoments without_blur(SoftMoments m);
 // Centre, axes and diameter of the ellipse of equal moments; (left, top) is where the moments' window begins.
 void set_axes(const SoftMoments& moments, int left, int top, Blob& blob);
 

@@ -499,7 +499,7 @@ double QuickMeasure::open_part(double contrast) const {
 }
 
 void QuickMeasure::judge(double outline, Blob& blob) {
-    const SoftMoments m = moments(outline, blob.contrast);
+    const SoftMoments m = without_blur(moments(outline, blob.contrast));
     if (m.weight <= 0.0) {
         blob.rejection = Rejection::kSmall;
         return;

@@ -43,6 +43,28 @@ TEST(BlobShape, AxesOfAnEllipseAtAnyAngle) {
     }
 }
 
+// Weights of an ellipse behind a symmetric blur: the same sum, the variance of the blur in both directions.
+TEST(BlobShape, BlurIsTakenOffTheAxesAndNothingElse) {
+    for (const double angle : {0.0, 0.7}) {
+        const SoftMoments sharp = ellipse(8.0, 3.0, angle);
+        SoftMoments blurred = sharp;
+        blurred.xx += 0.4;
+        blurred.yy += 0.4;
+        const SoftMoments m = without_blur(blurred);
+        EXPECT_NEAR(m.xx, sharp.xx, 1e-9);
+        EXPECT_NEAR(m.xy, sharp.xy, 1e-9);
+        EXPECT_NEAR(m.yy, sharp.yy, 1e-9);
+        EXPECT_EQ(m.x, blurred.x);
+        EXPECT_EQ(m.weight, blurred.weight);
+    }
+    const SoftMoments clean = ellipse(8.0, 3.0, 0.3);
+    EXPECT_NEAR(without_blur(clean).xx, clean.xx, 1e-9);
+    SoftMoments ring = clean;  // more than any blur: a shape that is no ellipse keeps its size
+    ring.xx += 5.0;
+    ring.yy += 5.0;
+    EXPECT_NEAR(without_blur(ring).xx, ring.xx - 0.5, 1e-9);
+}
+
 TEST(BlobShape, ACleanDiscIsAMarker) {
     Blob blob = disc();
     judge_shape(1.5, {}, blob);
