@@ -14,13 +14,11 @@ cv::Mat matrix(const ImageView& image) {
             static_cast<std::size_t>(image.stride_bytes)};
 }
 
-cv::Mat adaptive_mask(const ImageView& image, bool bright) {
-    constexpr int kBlock = 31;      // three dots of 10 px
-    constexpr double kStep = 12.0;  // grey levels
+cv::Mat adaptive_mask(const ImageView& image, bool bright, double step) {
+    constexpr int kBlock = 31;  // three dots of 10 px
     cv::Mat mask;
     cv::adaptiveThreshold(matrix(image), mask, 255, cv::ADAPTIVE_THRESH_MEAN_C,
-                          bright ? cv::THRESH_BINARY : cv::THRESH_BINARY_INV, kBlock,
-                          bright ? -kStep : kStep);
+                          bright ? cv::THRESH_BINARY : cv::THRESH_BINARY_INV, kBlock, bright ? -step : step);
     return mask;
 }
 
@@ -54,11 +52,11 @@ std::vector<test::SeenDot> simple_blob_detector(const ImageView& image, bool bri
     return seen;
 }
 
-std::vector<test::SeenDot> threshold_contours(const ImageView& image, bool bright) {
+std::vector<test::SeenDot> threshold_contours(const ImageView& image, bool bright, double step) {
     std::vector<std::vector<cv::Point>> contours;
     std::vector<cv::Vec4i> hierarchy;
     // Not RETR_EXTERNAL: the outline of a head would hide every dot on it.
-    cv::findContours(adaptive_mask(image, bright), contours, hierarchy, cv::RETR_CCOMP,
+    cv::findContours(adaptive_mask(image, bright, step), contours, hierarchy, cv::RETR_CCOMP,
                      cv::CHAIN_APPROX_NONE);
     std::vector<test::SeenDot> seen;
     for (std::size_t i = 0; i < contours.size(); ++i) {
@@ -77,7 +75,7 @@ std::vector<test::SeenDot> threshold_components(const ImageView& image, bool bri
     cv::Mat stats;
     cv::Mat centroids;
     const int count =
-        cv::connectedComponentsWithStats(adaptive_mask(image, bright), labels, stats, centroids);
+        cv::connectedComponentsWithStats(adaptive_mask(image, bright, kUsualStep), labels, stats, centroids);
     std::vector<test::SeenDot> seen;
     for (int i = 1; i < count; ++i) {
         const double area = stats.at<int>(i, cv::CC_STAT_AREA);

@@ -30,12 +30,30 @@ Vector unit(const Vector& a) {
     const double length = std::sqrt(dot(a, a));
     return {a.x / length, a.y / length, a.z / length};
 }
+Vector cross(const Vector& a, const Vector& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+// Rodrigues' formula.
+Vector turned(const Vector& v, const double (&turn_rad)[3]) {
+    const Vector turn{turn_rad[0], turn_rad[1], turn_rad[2]};
+    const double angle = std::sqrt(dot(turn, turn));
+    if (angle == 0.0) return v;
+    const Vector axis = unit(turn);
+    const Vector side = cross(axis, v);
+    const double along = dot(axis, v) * (1.0 - std::cos(angle));
+    const double c = std::cos(angle);
+    const double s = std::sin(angle);
+    return {v.x * c + side.x * s + axis.x * along, v.y * c + side.y * s + axis.y * along,
+            v.z * c + side.z * s + axis.z * along};
+}
 
 // Camera at the origin, looking along +z at a sphere.
 class Head {
   public:
     Head(const DiscSceneConfig& config, SeededRandom& random)
-        : c_(config), depth_(config.distance_mm + config.head_radius_mm) {
+        : c_(config),
+          centre_{config.slip_mm[0], config.slip_mm[1],
+                  config.slip_mm[2] + config.distance_mm + config.head_radius_mm} {
         const double angle = random.uniform(0.0, 2.0 * std::numbers::pi);
         const double tilt = random.uniform(0.35, 0.9);
         light_ = {std::cos(angle) * std::sin(tilt), std::sin(angle) * std::sin(tilt), -std::cos(tilt)};
@@ -47,19 +65,19 @@ class Head {
     [[nodiscard]] bool hit(double x_px, double y_px, Vector& normal, double& cosine) const {
         const Vector ray = unit({(x_px - 0.5 * (c_.width_px - 1)) / c_.focal_px,
                                  (y_px - 0.5 * (c_.height_px - 1)) / c_.focal_px, 1.0});
-        const double along = ray.z * depth_;
-        const double square = along * along - depth_ * depth_ + c_.head_radius_mm * c_.head_radius_mm;
+        const double along = dot(ray, centre_);
+        const double square = along * along - dot(centre_, centre_) + c_.head_radius_mm * c_.head_radius_mm;
         if (square <= 0.0) return false;
         const double t = along - std::sqrt(square);
-        normal = {t * ray.x / c_.head_radius_mm, t * ray.y / c_.head_radius_mm,
-                  (t * ray.z - depth_) / c_.head_radius_mm};
+        normal = {(t * ray.x - centre_.x) / c_.head_radius_mm, (t * ray.y - centre_.y) / c_.head_radius_mm,
+                  (t * ray.z - centre_.z) / c_.head_radius_mm};
         cosine = -dot(normal, ray);
         return true;
     }
 
     [[nodiscard]] Vector point(const Vector& normal) const {
         const double r = c_.head_radius_mm;
-        return {r * normal.x, r * normal.y, r * normal.z + depth_};
+        return {r * normal.x + centre_.x, r * normal.y + centre_.y, r * normal.z + centre_.z};
     }
     [[nodiscard]] double cosine_at(const Vector& normal) const { return -dot(normal, unit(point(normal))); }
     [[nodiscard]] double x_px(const Vector& p) const {
@@ -76,7 +94,7 @@ class Head {
 
   private:
     const DiscSceneConfig& c_;
-    double depth_;
+    Vector centre_;
     Vector light_;
     double ambient_ = 0.0;
     double level_ = 0.0;
@@ -88,7 +106,8 @@ struct Disc {
 };
 
 // A Fibonacci lattice, turned and jittered: neighbours are three diameters and more apart.
-std::vector<Disc> place_discs(const DiscSceneConfig& config, const Head& head, SeededRandom& random) {
+// The same ones, in the same order, wherever the head slips to.
+std::vector<Disc> place_discs(const DiscSceneConfig& config, const Head& rest, SeededRandom& random) {
     std::vector<Disc> discs;
     const double turn = random.uniform(0.0, 2.0 * std::numbers::pi);
     const double spread = 75.0 / config.head_radius_mm;
@@ -97,9 +116,10 @@ std::vector<Disc> place_discs(const DiscSceneConfig& config, const Head& head, S
         const double z = -1.0 + 2.0 * (i + 0.5) / count + random.uniform(-0.15, 0.15) / count;
         const double ring = std::sqrt(std::max(0.0, 1.0 - z * z));
         const double angle = turn + kGoldenAngle * i + random.uniform(-0.02, 0.02);
-        const Vector normal{ring * std::cos(angle), ring * std::sin(angle), z};
-        if (head.cosine_at(normal) < config.least_cosine) continue;
-        discs.push_back({normal, config.bright ? random.uniform(3.5, 5.0) : kInkPaint});
+        const Vector at_rest{ring * std::cos(angle), ring * std::sin(angle), z};
+        if (rest.cosine_at(at_rest) < config.least_cosine) continue;
+        discs.push_back(
+            {turned(at_rest, config.slip_rad), config.bright ? random.uniform(3.5, 5.0) : kInkPaint});
     }
     return discs;
 }
@@ -172,12 +192,16 @@ double skin_level(const DiscSceneConfig& config) {
 
 DiscLight light_of(const DiscSceneConfig& config) {
     SeededRandom random(config.seed);
+    DiscSceneConfig at_rest = config;
+    std::fill_n(at_rest.slip_mm, 3, 0.0);
+    SeededRandom same = random;
+    const Head rest(at_rest, same);
     const Head head(config, random);
     FineField fine(config.width_px, config.height_px);
     paint_skin(head, fine);
     std::vector<DiscTruth> discs;
     std::int16_t index = 0;
-    for (const Disc& disc : place_discs(config, head, random)) {
+    for (const Disc& disc : place_discs(config, rest, random)) {
         discs.push_back(paint_disc(config, head, disc, index++, fine));
     }
     const Film film = disturb(config, discs, fine, random);
@@ -192,7 +216,7 @@ DiscLight light_of(const DiscSceneConfig& config) {
 
 DiscPicture render(const DiscSceneConfig& config) {
     DiscLight lit = light_of(config);
-    SeededRandom random(config.seed ^ 0x5EED);
+    SeededRandom random(config.seed ^ 0x5EED ^ (config.frame << 32));
     return {digitise(lit.light, config.read_noise, config.shot_noise, random), std::move(lit.discs)};
 }
 

@@ -44,7 +44,10 @@ struct DiscSceneConfig {
     double read_noise = 1.5;
     double shot_noise = 0.1;  // variance per grey level
     Disturbance disturbance = Disturbance::kNone;
-    std::uint64_t seed = 1;
+    double slip_rad[3] = {};  // the head with its discs, turned about its centre (an axis times an angle) and
+    double slip_mm[3] = {};   // then moved, camera axes; the light stays where it is
+    std::uint64_t seed = 1;   // of head, discs, light and what disturbs
+    std::uint64_t frame = 0;  // of that seed: the sensor's noise is another one
 };
 
 struct DiscTruth {
