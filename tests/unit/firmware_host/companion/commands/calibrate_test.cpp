@@ -6,10 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "firmware_host/companion/commands/calibrate_reference.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/files/image_file.hpp"
 #include "firmware_host/companion/train/camera_file.hpp"
+#include "firmware_host/companion/train/pack_writer.hpp"
 #include "tests/support/board_scene/board_scene.hpp"
+#include "tests/support/pack_samples/sample_pack.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/text_checks.hpp"
 #include "tests/unit/firmware_host/companion/commands/verb_run.hpp"
@@ -135,6 +138,26 @@ TEST_F(CalibrateVerb, TheHelmetsMarksAreCarriedOverAndNeverLostInSilence) {
         EXPECT_EQ((*kept)[i].headset_mm, marks[i].headset_mm);
         EXPECT_EQ((*kept)[i].cameras, marks[i].cameras);
     }
+}
+
+TEST_F(CalibrateVerb, TheRigAsItWasIsReadOffAPackToo) {
+    const test::SamplePack sample({.cameras = 2, .reference_marks = 3});
+    ASSERT_TRUE(host::save_pack(at("face.pack"), sample.view, {}).has_value());
+    const auto reference = host::load_rig_reference(at("face.pack"));
+    ASSERT_TRUE(reference.has_value()) << reference.error().message;
+    ASSERT_EQ(reference->cameras.size(), 2U);
+    EXPECT_EQ(reference->cameras[1].centre_mm, sample.view.cameras[1].centre_mm);
+    ASSERT_EQ(reference->marks.size(), 3U);
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_EQ(reference->marks[i].headset_mm, sample.view.reference_marks[i].headset_mm);
+        EXPECT_EQ(reference->marks[i].cameras, sample.view.reference_marks[i].cameras);
+    }
+    const test::SamplePack without({.cameras = 0});
+    ASSERT_TRUE(host::save_pack(at("blind.pack"), without.view, {}).has_value());
+    const auto none = host::load_rig_reference(at("blind.pack"));
+    ASSERT_FALSE(none.has_value());
+    EXPECT_TRUE(has(none.error().message, "without cameras")) << none.error().message;
+    EXPECT_FALSE(host::load_rig_reference(at("missing.json")).has_value());
 }
 
 // The eight moments as cameras would deliver them: each held for half a second.
