@@ -2,10 +2,11 @@
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs calib3d aruco)
-# Calibration alone needs the last two, which pull in a hundred libraries more.
+find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs calib3d aruco videoio)
+# Calibration alone needs the last three, which pull in a hundred libraries more.
 set(OpenCV_LIBS opencv_core opencv_imgproc opencv_imgcodecs)
 set(RIG_OPENCV_CALIBRATION_LIBS opencv_calib3d opencv_aruco)
+set(RIG_OPENCV_CAPTURE_LIBS opencv_videoio)
 find_package(CLI11 REQUIRED)
 find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)

@@ -4,7 +4,7 @@ A serial device or pty is asked to start its streams; a file, or standard input 
 import os, stat, struct, sys, time, tty
 
 TYPES = dict(enumerate("hello request,hello,names request,names,time request,time reply,goodbye".split(","), 1))
-TYPES |= dict(enumerate("weights,markers,status,event".split(","), 0x10)) | {0x30: "ack", 0x31: "nak"}
+TYPES |= dict(enumerate("weights,markers,status,event,head pose".split(","), 0x10)) | {0x30: "ack", 0x31: "nak"}
 TYPES |= dict(enumerate("start streams,stop streams,status request,command,control".split(","), 0x20))
 TEXT_AT = {2: 28, 4: 8, 0x13: 16}  # where the texts of a message begin
 
@@ -35,8 +35,8 @@ def describe(kind, p):
         weights = " ".join(f"{w / 16384:.4f}" for w in struct.unpack_from(f"<{count}h", p, 62))
         head = "state %d capture_us %d age_us %d faults %#x " % struct.unpack_from("<IqIQ", p) + ["safe", "lost", "hold", "partial", "live"][p[52]]
         return f"{head}{' held' if p[53] & 1 else ''} shapes {first}+{count}/{total}: {weights}"
-    if kind == 0x11:
-        return "state %d capture_us %d markers %d first %d count %d" % struct.unpack_from("<IqHHH", p)
+    if kind == 0x11: return "state %d capture_us %d markers %d first %d count %d" % struct.unpack_from("<IqHHH", p)
+    if kind == 0x14: return "state %d capture_us %d status %d turn %.4f %.4f %.4f place %.2f %.2f %.2f" % struct.unpack_from("<IqBxxx6f", p)
     if kind == 0x12:
         return "up %d us, ticks %d solved %d held %d overruns %d sent %d dropped %d" % struct.unpack_from("<q6I", p, 8)
     text = p[TEXT_AT[kind]:].decode("utf-8", "replace") if kind in TEXT_AT else p.hex(" ")

@@ -33,6 +33,31 @@ struct Slip {
     std::array<float, 3> translation_mm{};
 };
 
+// Why a tick says nothing of where the head is. The order is the wire's.
+enum class HeadStatus : std::uint8_t {
+    kUnknown = 0,    // the cameras are on the head, or no face was solved in this tick
+    kKnown = 1,      // measured
+    kTooFew = 2,     // too few markers
+    kFlat = 3,       // the markers that are seen lie nearly in a plane
+    kBehind = 4,     // no place before the cameras explains them
+    kUncertain = 5,  // some motion is left open
+    kMistaken = 6    // too many markers disagree
+};
+
+// Where the head is before cameras that are not on it: reference = R(rotation) face + translation, in the
+// frame of the cameras' places. Of this tick's own pictures, neither smoothed nor held. All zero, the status
+// aside, unless it is known.
+struct HeadPlace {
+    HeadStatus status = HeadStatus::kUnknown;
+    std::int64_t capture_us = 0;    // mid-exposure of this tick's pictures
+    std::uint16_t points_used = 0;  // markers that agree, each as often as cameras see it
+    std::array<float, 3> rotation_rad{};
+    std::array<float, 3> translation_mm{};
+    std::array<float, 3> rotation_sigma_rad{};    // standard deviations; rotation about the markers' centroid
+    std::array<float, 3> translation_sigma_mm{};  // of that centroid
+    float rms_px = 0.0F;
+};
+
 // Every weight is finite and inside the range that its pack declares. When `held`, no solve stands behind
 // this tick: weights are the last good ones, the decay to rest or the rest pose, and age_us says how old the
 // capture is.
@@ -45,6 +70,7 @@ struct FaceState {
     std::array<CameraStatus, kMaxCameras> cameras{};
     FaultMap faults = 0;  // current, not latched
     Slip slip;
+    HeadPlace head;
     std::uint16_t shape_count = 0;
     std::array<float, kMaxShapes> weights{};
     std::array<float, kMaxShapes> confidence{};  // 0..1

@@ -339,4 +339,10 @@ HeadPose solve_pnp(std::span<const NamedPixel> given, const PnpConfig& config, c
     return answer;
 }
 
+HeadPose track_pnp(std::span<const NamedPixel> points, const PnpConfig& config, HeadPose& last_known) {
+    const HeadPose answer = solve_pnp(points, config, last_known);
+    if (answer.known) last_known = answer;
+    return answer;
+}
+
 }  // namespace rig

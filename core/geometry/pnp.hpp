@@ -60,4 +60,9 @@ struct HeadPose {
 [[nodiscard]] HeadPose solve_pnp(std::span<const NamedPixel> points, const PnpConfig& config,
                                  const HeadPose& before = {});
 
+// The same, frame after frame. `last_known` is the start besides nothing, and becomes the answer when that is
+// known: a refused frame does not take the start away from the next one.
+[[nodiscard]] HeadPose track_pnp(std::span<const NamedPixel> points, const PnpConfig& config,
+                                 HeadPose& last_known);
+
 }  // namespace rig

@@ -38,6 +38,33 @@ void write_slip(const Rigid& pose, Slip& slip) {
     }
 }
 
+// Refusals in the order of the wire.
+HeadStatus head_status(const HeadPose& pose) {
+    static_assert(static_cast<int>(PnpRefusal::kTooFew) + 1 == static_cast<int>(HeadStatus::kTooFew));
+    static_assert(static_cast<int>(PnpRefusal::kMistaken) + 1 == static_cast<int>(HeadStatus::kMistaken));
+    if (pose.known) return HeadStatus::kKnown;
+    if (pose.refusal == PnpRefusal::kNone) return HeadStatus::kUnknown;
+    return static_cast<HeadStatus>(static_cast<int>(pose.refusal) + 1);
+}
+
+void write_head(const HeadPose& pose, std::int64_t capture_us, HeadPlace& head) {
+    head = HeadPlace{};
+    head.status = head_status(pose);
+    head.capture_us = capture_us;
+    if (!pose.known) return;
+    head.points_used = pose.points_used;
+    Slip place;
+    write_slip(pose.reference_from_face, place);
+    head.rotation_rad = place.rotation_rad;
+    head.translation_mm = place.translation_mm;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const auto axis = static_cast<Eigen::Index>(i);
+        head.rotation_sigma_rad[i] = static_cast<float>(pose.rotation_sigma_rad[axis]);
+        head.translation_sigma_mm[i] = static_cast<float>(pose.translation_sigma_mm[axis]);
+    }
+    head.rms_px = static_cast<float>(pose.rms_px);
+}
+
 }  // namespace
 
 Result<void, PipelineError> Pipeline::configure(const SolvePack& pack, const PipelineConfig& config) {
@@ -184,7 +211,8 @@ void Pipeline::take_observations(std::size_t camera, std::span<const Observation
     find_helmet_marks(pack_.cameras[camera], camera, pack_.helmet_marks(), observations, mark_config_,
                       mounts_[camera], helmet_marks_);
     report.mounts[camera] = helmet_marks_.drift;
-    add_camera_view(helmet_marks_.now, observations, kCentreSigmaPx, camera_depth_mm_[camera], sightings_,
+    cameras_now_[camera] = helmet_marks_.now;
+    add_camera_view(cameras_now_[camera], observations, kCentreSigmaPx, camera_depth_mm_[camera], sightings_,
                     helmet_marks_.taken.span());
 }
 
@@ -296,15 +324,14 @@ void Pipeline::find_head_pose(FrameReport& report) {
             const Observation& seen = observations_[c][static_cast<std::size_t>(at)];
             const Vec3 face_mm =
                 model_.face_position(k, stabilised_.fit.coefficients) + neutral_.offset_mm[k];
-            const bool kept = named_pixels_.push_back({&pack_.cameras[c], face_mm, pixel_of(seen)});
+            const bool kept = named_pixels_.push_back({&cameras_now_[c], face_mm, pixel_of(seen)});
             RIG_CHECK(kept);
         }
     }
     PnpConfig config;
     // What the shapes leave of the face counts as well as the detector's error.
     config.sigma_px = kHeadSigmaPx;
-    report.head_pose = solve_pnp(named_pixels_.span(), config, head_pose_);
-    head_pose_ = report.head_pose;
+    report.head_pose = track_pnp(named_pixels_.span(), config, head_pose_);
 }
 
 void Pipeline::solve_named(std::int64_t capture_us, FrameReport& report) {
@@ -360,6 +387,7 @@ void Pipeline::finish(std::int64_t capture_us, bool usable, FaceState& state, Fr
                       usable ? &stabilised_ : nullptr, neutral_, report.neutral);
         if (!usable && ladder_.state == TrackingState::kLost) forget();
         put_out(capture_us, usable, state, report);
+        if (!config_.camera_on_head) write_head(report.head_pose, capture_us, state.head);
     }
     raise_faults(usable, report, state);
 }

@@ -102,6 +102,7 @@ class Pipeline {
     HelmetMarkConfig mark_config_;
     std::array<MountDriftState, kMaxCameras> mounts_{};
     HelmetMarkOutput helmet_marks_;
+    std::array<CameraModel, kMaxCameras> cameras_now_{};  // as they sit in this frame: what rays came from
     SightingSet sightings_;
 
     TrackerConfig tracker_config_;

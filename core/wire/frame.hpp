@@ -42,6 +42,7 @@ enum class MessageType : std::uint8_t {
     kMarkers = 0x11,
     kStatus = 0x12,
     kEvent = 0x13,
+    kHeadPose = 0x14,
     kStartStreams = 0x20,
     kStopStreams = 0x21,
     kStatusRequest = 0x22,

@@ -250,7 +250,7 @@ Result<TimeReply, WireError> decode_time_reply(ByteSpan payload) {
 namespace {
 
 bool is_good_mask(std::uint8_t mask) {
-    return mask != 0 && (mask & ~kAllStreams) == 0;
+    return mask != 0 && (mask & ~(kAllStreams | kStreamHead)) == 0;
 }
 
 bool in_range(const StartStreams& start) {

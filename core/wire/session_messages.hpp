@@ -27,6 +27,7 @@ inline constexpr std::uint32_t kCanStreamMarkers = 1U << 0;
 inline constexpr std::uint32_t kCanResetTracking = 1U << 1;
 inline constexpr std::uint32_t kIsSimulated = 1U << 2;
 inline constexpr std::uint32_t kCanControl = 1U << 3;
+inline constexpr std::uint32_t kCanStreamHead = 1U << 4;  // its cameras are not on the head
 
 // Both directions. A host leaves everything about a pack zero.
 struct Hello {
@@ -96,6 +97,9 @@ inline constexpr std::uint8_t kStreamWeights = 1U << 0;
 inline constexpr std::uint8_t kStreamMarkers = 1U << 1;
 inline constexpr std::uint8_t kStreamStatus = 1U << 2;
 inline constexpr std::uint8_t kAllStreams = kStreamWeights | kStreamMarkers | kStreamStatus;
+// Head pose, sent before the weights of the same tick and only with them. Not among kAllStreams: boards
+// without kCanStreamHead refuse a mask that has it.
+inline constexpr std::uint8_t kStreamHead = 1U << 3;
 
 // Starts the streams of `mask`; the others stay as they are. Divider d: every d-th tick is sent.
 struct StartStreams {

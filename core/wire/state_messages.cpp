@@ -309,6 +309,84 @@ Result<MarkersPart, WireError> decode_markers(ByteSpan payload) {
     return out;
 }
 
+namespace {
+
+using HeadNumbers = std::array<float, 13>;  // in the order of the wire; from the seventh on none is negative
+constexpr std::size_t kFirstSigma = 6;
+
+HeadNumbers numbers_of(const HeadPlace& head) {
+    HeadNumbers out{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        out[axis] = head.rotation_rad[axis];
+        out[3 + axis] = head.translation_mm[axis];
+        out[6 + axis] = head.rotation_sigma_rad[axis];
+        out[9 + axis] = head.translation_sigma_mm[axis];
+    }
+    out[12] = head.rms_px;
+    return out;
+}
+
+void put_numbers(const HeadNumbers& numbers, HeadPlace& head) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        head.rotation_rad[axis] = numbers[axis];
+        head.translation_mm[axis] = numbers[3 + axis];
+        head.rotation_sigma_rad[axis] = numbers[6 + axis];
+        head.translation_sigma_mm[axis] = numbers[9 + axis];
+    }
+    head.rms_px = numbers[12];
+}
+
+bool good_head_numbers(const HeadNumbers& numbers) {
+    bool good = true;
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+        good = good && is_slip_number(numbers[i]) && (i < kFirstSigma || numbers[i] >= 0.0F);
+    return good;
+}
+
+}  // namespace
+
+Result<std::size_t, WireError> encode(const HeadPoseMessage& message, MutableByteSpan into) {
+    if (message.head.status > HeadStatus::kMistaken) return failure(WireError::kRange);
+    HeadNumbers numbers = numbers_of(message.head);
+    HeadStatus status = message.head.status;
+    if (status == HeadStatus::kKnown && !good_head_numbers(numbers)) status = HeadStatus::kUncertain;
+    const bool known = status == HeadStatus::kKnown;
+    if (!known) numbers = HeadNumbers{};
+    bool altered = false;
+    ByteWriter writer(into);
+    writer.write(message.sequence);
+    writer.write(clamped_time(message.head.capture_us, altered));
+    writer.write(status);
+    writer.write(std::uint8_t{0});
+    writer.write(known ? message.head.points_used : std::uint16_t{0});
+    writer.write(numbers);
+    if (!writer.ok()) return failure(WireError::kSpace);
+    return writer.size();
+}
+
+Result<HeadPoseMessage, WireError> decode_head_pose(ByteSpan payload) {
+    if (payload.size() != kHeadPoseBytes) return failure(WireError::kLength);
+    ByteReader reader(payload);
+    HeadPoseMessage out;
+    HeadPlace& head = out.head;
+    out.sequence = reader.read<std::uint32_t>();
+    head.capture_us = reader.read<std::int64_t>();
+    head.status = reader.read<HeadStatus>();
+    const auto reserved = reader.read<std::uint8_t>();
+    head.points_used = reader.read<std::uint16_t>();
+    const ByteSpan rest = payload.subspan(payload.size() - reader.remaining());
+    put_numbers(reader.read<HeadNumbers>(), head);
+    bool good = reserved == 0 && head.status <= HeadStatus::kMistaken &&
+                head.capture_us >= -kMaxWireTime_us && head.capture_us <= kMaxWireTime_us &&
+                good_head_numbers(numbers_of(head));
+    if (head.status != HeadStatus::kKnown) {
+        good = good && head.points_used == 0;
+        for (const std::byte each : rest) good = good && each == std::byte{0};  // minus zero is no zero here
+    }
+    if (!good) return failure(WireError::kRange);
+    return out;
+}
+
 PartLedger::Verdict PartLedger::accept(std::uint32_t sequence, std::uint16_t total, std::uint8_t part,
                                        std::uint8_t part_count) {
     RIG_CHECK(part < part_count && part_count <= 32);

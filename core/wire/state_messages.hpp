@@ -1,5 +1,5 @@
-// The streams: weights of a FaceState and measured markers, split over as many frames as they need, and the
-// assembly of parts on the other side. Layouts: PROTOCOL.md.
+// The streams: weights of a FaceState, where the head is, and measured markers, split over as many frames as
+// they need, and the assembly of parts on the other side. Layouts: PROTOCOL.md.
 #pragma once
 
 #include <array>
@@ -87,6 +87,19 @@ struct MarkersPart {
 [[nodiscard]] Result<std::size_t, WireError> encode_markers(const MarkerFrame& frame, std::size_t part,
                                                             MutableByteSpan into);
 [[nodiscard]] Result<MarkersPart, WireError> decode_markers(ByteSpan payload);
+
+// Where the head is, of a board whose cameras are not on it (kCanStreamHead).
+inline constexpr std::size_t kHeadPoseBytes = 68;
+
+struct HeadPoseMessage {
+    std::uint32_t sequence = 0;  // of the FaceState of the same tick
+    HeadPlace head;
+};
+
+// Never refuses a pose for its numbers: one with a number that is not finite, beyond +-1e6 or a negative
+// deviation is sent as kUncertain. kRange: a status outside its enum. kSpace: `into` is too small.
+[[nodiscard]] Result<std::size_t, WireError> encode(const HeadPoseMessage& message, MutableByteSpan into);
+[[nodiscard]] Result<HeadPoseMessage, WireError> decode_head_pose(ByteSpan payload);
 
 struct AssemblyCounters {
     std::uint64_t whole = 0;       // states handed out

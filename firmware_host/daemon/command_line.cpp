@@ -61,13 +61,16 @@ std::string default_boards() {
 
 // "" when the list is good.
 std::string read_streams(const std::string& list, StartStreams& streams) {
-    const std::map<std::string, std::uint8_t> bits{
-        {"weights", kStreamWeights}, {"markers", kStreamMarkers}, {"status", kStreamStatus}};
+    const std::map<std::string, std::uint8_t> bits{{"weights", kStreamWeights},
+                                                   {"markers", kStreamMarkers},
+                                                   {"status", kStreamStatus},
+                                                   {"head", kStreamHead}};
     std::istringstream words(list);
     std::string word;
     while (std::getline(words, word, ',')) {
         const auto found = bits.find(word);
-        if (found == bits.end()) return "'" + word + "' is no stream; there are weights, markers and status";
+        if (found == bits.end())
+            return "'" + word + "' is no stream; there are weights, markers, status and head";
         streams.mask |= found->second;
     }
     return streams.mask == 0 ? "names no stream" : "";
@@ -95,6 +98,8 @@ void add_camera_options(CLI::App& app, CommandLine& into) {
                                              {"bright", MarkerPolarity::kBright}};
     add_choice(app, "--polarity", polarities, into.pipeline.polarity,
                "What the markers are: auto, dark or bright");
+    app.add_flag("!--cameras-off-head", into.pipeline.camera_on_head,
+                 "The cameras stand beside the performer: stream where the head is, no slip of a helmet");
     app.add_flag("--auto-exposure", into.auto_exposure,
                  "Set exposure and gain of the cameras by the light at the markers");
     app.add_option("--max-exposure-us", into.most_exposure_us,
@@ -140,7 +145,8 @@ bool parse_command_line(int argc, char** argv, CommandLine& into, int& exit_code
     app.add_option("--name", into.name, "Name or serial number, as the host sees it; up to 32 bytes")
         ->capture_default_str();
     add_choice(app, "--executor", executors, into.executor, "auto (as the world runs), threads or lockstep");
-    app.add_option("--stream", streams, "Streams to run without a host asking: weights,markers,status")
+    app.add_option("--stream", streams,
+                   "Streams to run without a host asking: weights,markers,status,head (with the weights)")
         ->type_name("LIST");
     app.add_option("--wait-host", into.wait_host_s,
                    "Seconds to wait, before the first tick, for a host to start a stream")

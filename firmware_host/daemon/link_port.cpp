@@ -38,6 +38,7 @@ void LinkPort::offer(const TickOutput& output) {
     Due due;
     due.weights = (streams_.mask & kStreamWeights) != 0 &&
                   is_due(tick, weights_at_, streams_.weights_divider, !any_offered_);
+    due.head = due.weights && (streams_.mask & kStreamHead) != 0;
     due.markers = (streams_.mask & kStreamMarkers) != 0 &&
                   is_due(tick, markers_at_, streams_.markers_divider, !any_offered_);
     due.status = (streams_.mask & kStreamStatus) != 0 &&
@@ -49,6 +50,7 @@ void LinkPort::offer(const TickOutput& output) {
     if (is_waiting_ && waiting_due_.any()) {
         if (waiting_due_.weights) note_replaced();
         // The newer one stands in for what the older one owed.
+        due.head |= waiting_due_.head;
         due.weights |= waiting_due_.weights;
         due.markers |= waiting_due_.markers;
         due.status |= waiting_due_.status;
@@ -131,6 +133,7 @@ bool LinkPort::load_next_frame() {
 }
 
 void LinkPort::skip_undue_stages() {
+    if (stage_ == Stage::kHead && !sending_due_.head) stage_ = Stage::kWeights;
     if (stage_ == Stage::kWeights && !sending_due_.weights) stage_ = Stage::kMarkers;
     if (stage_ == Stage::kMarkers && !sending_due_.markers) stage_ = Stage::kStatus;
     if (stage_ == Stage::kStatus && !sending_due_.status && !status_wanted_) stage_ = Stage::kNothing;
@@ -143,7 +146,7 @@ void LinkPort::begin_waiting() {
     waiting_due_ = {};
     sending_.state.age_us = clock_.now_us() - sending_.state.capture_us;
     sending_.state.faults |= link_faults_;
-    stage_ = Stage::kWeights;
+    stage_ = Stage::kHead;
     part_ = 0;
 }
 
@@ -161,6 +164,11 @@ bool LinkPort::load_stream_frame() {
     switch (stage_) {
         case Stage::kNothing:
             return false;
+        case Stage::kHead:
+            type = MessageType::kHeadPose;
+            length = encode(HeadPoseMessage{sending_.state.sequence, sending_.state.head}, payload);
+            next_part(1, Stage::kWeights);
+            break;
         case Stage::kWeights:
             length = encode_weights(sending_.state, part_, payload);
             next_part(weights_part_count(sending_.state.shape_count), Stage::kMarkers);
@@ -184,7 +192,7 @@ bool LinkPort::load_stream_frame() {
 
 void LinkPort::finish_frame() {
     frame_bytes_ = frame_sent_ = 0;
-    const bool weights_done = sending_due_.weights && stage_ != Stage::kWeights;
+    const bool weights_done = sending_due_.weights && stage_ > Stage::kWeights;
     if (!weights_done) return;
     sending_due_.weights = false;
     ++states_sent_;

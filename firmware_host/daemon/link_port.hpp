@@ -68,8 +68,9 @@ class LinkPort {
     [[nodiscard]] Health health(const Health& of_solver) const;
 
   private:
-    enum class Stage : std::uint8_t { kWeights, kMarkers, kStatus, kNothing };
+    enum class Stage : std::uint8_t { kHead, kWeights, kMarkers, kStatus, kNothing };
     struct Due {
+        bool head = false;  // only ever with weights
         bool weights = false;
         bool markers = false;
         bool status = false;

@@ -277,6 +277,7 @@ Result<void, WiringError> Wiring::Rig::start_log(const CommandLine& command_line
     header.rate_millihertz = world->hello().rate_millihertz;
     header.filter = running.filter;
     header.stabilise = running.stabilise;
+    header.camera_on_head = running.camera_on_head;
     header.smoothing = running.smoothing;
     header.loss_policy = static_cast<std::uint8_t>(running.loss_policy);
     if (pack != nullptr) header.pack_hash = pack->manifest().manifest_hash;
@@ -293,6 +294,7 @@ BoardIdentity Wiring::Rig::identity(const CommandLine& command_line) const {
     hello.role = Role::kBoard;
     hello.session_id = std::random_device{}();
     hello.capabilities = kCanStreamMarkers | kCanResetTracking | kCanControl | kIsSimulated;
+    if (!running.camera_on_head) hello.capabilities |= kCanStreamHead;
     hello.rate_mhz = static_cast<std::uint32_t>(board.rate_hz * 1000.0 + 0.5);
     hello.firmware = FixedText<24>(RIG_VERSION);
     hello.serial = FixedText<32>(command_line.name);

@@ -14,6 +14,7 @@ constexpr std::uint16_t kVersion = 2;
 constexpr std::size_t kFirstVersionHeaderBytes = 64;
 constexpr std::uint8_t kFilterBit = 1;
 constexpr std::uint8_t kStabiliseBit = 2;
+constexpr std::uint8_t kOffHeadBit = 16;
 constexpr std::uint8_t kResetBit = 1;
 constexpr std::uint8_t kControlsBit = 2;
 constexpr std::uint8_t kNeutralBit = 4;
@@ -39,7 +40,8 @@ void write_header(const ObservationLogHeader& header, MutableByteSpan into) {
     writer.write(std::uint8_t{0});
     writer.write(header.rate_millihertz);
     writer.write(static_cast<std::uint8_t>((header.filter ? kFilterBit : 0) |
-                                           (header.stabilise ? kStabiliseBit : 0) | header.loss_policy << 2));
+                                           (header.stabilise ? kStabiliseBit : 0) | header.loss_policy << 2 |
+                                           (header.camera_on_head ? 0 : kOffHeadBit)));
     writer.write(std::array<std::uint8_t, 3>{});
     writer.write(header.pack_hash);
     writer.write(header.smoothing.delay_frames);
@@ -166,7 +168,8 @@ Result<ObservationLogReader, ObservationLogError> ObservationLogReader::open(Byt
     const auto tail = reader.read<std::array<std::uint8_t, 15>>();
     log.header_.filter = (flags & kFilterBit) != 0;
     log.header_.stabilise = (flags & kStabiliseBit) != 0;
-    log.header_.loss_policy = flags >> 2;
+    log.header_.camera_on_head = (flags & kOffHeadBit) == 0;
+    log.header_.loss_policy = static_cast<std::uint8_t>((flags & ~kOffHeadBit) >> 2);
     const bool known = magic == kMagic && (version == 1 || version == kVersion) &&
                        log.header_.camera_count >= 1 && log.header_.camera_count <= kMaxCameras &&
                        log.header_.rate_millihertz > 0 && log.header_.rate_millihertz <= 1'000'000 &&

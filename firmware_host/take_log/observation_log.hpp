@@ -5,7 +5,8 @@
 //   6  1  u8 camera count, 1..4
 //   7  1  u8 reserved, 0
 //   8  4  u32 ticks per 1000 s
-//  12  1  u8 bit 0: smoothing was on; bit 1: stabilising was on; bits 2-3: loss policy
+//  12  1  u8 bit 0: smoothing was on; bit 1: stabilising was on; bits 2-3: loss policy; bit 4: the cameras
+//         were not on the head
 //  13  3  zero
 //  16 32  SHA-256 of the manifest of the pack
 //  48  1  u8 delay of the smoothing, frames
@@ -58,6 +59,7 @@ struct ObservationLogHeader {
     std::uint32_t rate_millihertz = 0;
     bool filter = true;
     bool stabilise = true;
+    bool camera_on_head = true;
     FilterChoice smoothing;        // when `filter` is set
     std::uint8_t loss_policy = 0;  // of core/pipeline
     std::array<std::byte, 32> pack_hash{};

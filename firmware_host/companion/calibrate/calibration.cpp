@@ -23,7 +23,6 @@ constexpr double kPictureTimes = 5.0;     // of the median distance of all point
 constexpr double kPictureFloor_px = 0.3;
 constexpr double kHopeless_px = 1.5;  // rms of a camera: these points are not those of this board
 constexpr int kRounds = 4;            // of leaving out and fitting again
-constexpr std::size_t kFields = 8;
 
 double median_of(std::vector<double> values) {
     if (values.empty()) return 0.0;
@@ -360,13 +359,9 @@ class CalibrationRun {
         for (const SeenPoint& seen : result_.seen) {
             result_.rms_px[seen.camera] += seen.residual_px.squaredNorm();
             ++result_.point_count[seen.camera];
-            const auto field = [&](double at, int size) {
-                const double share = std::clamp((at + 0.5) / size, 0.0, 1.0 - 1e-9);
-                return static_cast<std::size_t>(share * kFields);
-            };
             const CameraModel& camera = cameras_[seen.camera];
-            fields[seen.camera].insert(field(seen.at_px[1], camera.height_px) * kFields +
-                                       field(seen.at_px[0], camera.width_px));
+            fields[seen.camera].insert(
+                coverage_field(seen.at_px[0], seen.at_px[1], camera.width_px, camera.height_px));
         }
         for (std::size_t p = 0; p < task_.pictures.size(); ++p) {
             PictureVerdict& verdict = result_.verdicts[p];
@@ -377,7 +372,8 @@ class CalibrationRun {
         }
         for (std::size_t c = 0; c < camera_count(); ++c) {
             result_.rms_px[c] = std::sqrt(result_.rms_px[c] / static_cast<double>(result_.point_count[c]));
-            result_.coverage.push_back(static_cast<double>(fields[c].size()) / (kFields * kFields));
+            result_.coverage.push_back(static_cast<double>(fields[c].size()) /
+                                       (kCoverageFields * kCoverageFields));
         }
         std::vector<std::size_t> all(camera_count());
         for (std::size_t c = 0; c < all.size(); ++c) all[c] = c;
@@ -397,6 +393,14 @@ class CalibrationRun {
 };
 
 }  // namespace
+
+std::size_t coverage_field(double x_px, double y_px, int width_px, int height_px) {
+    const auto along = [](double at, int size) {
+        const double share = std::clamp((at + 0.5) / size, 0.0, 1.0 - 1e-9);
+        return static_cast<std::size_t>(share * kCoverageFields);
+    };
+    return along(y_px, height_px) * kCoverageFields + along(x_px, width_px);
+}
 
 Result<Calibration, FileError> calibrate(const CalibrationTask& task,
                                          const std::function<void(double)>& progress) {

@@ -20,6 +20,11 @@ inline constexpr std::size_t kGoodPictures = 15;  // under it a warning is due
 inline constexpr std::size_t kLeastPoints = 12;   // of a picture; fewer hardly say more than its pose
 inline constexpr std::size_t kLeastShared = 3;    // moments in which a camera and another saw the board
 
+// Coverage counts fields of the picture, kCoverageFields along each side. Row by row; pixels outside count as
+// the nearest field.
+inline constexpr std::size_t kCoverageFields = 8;
+[[nodiscard]] std::size_t coverage_field(double x_px, double y_px, int width_px, int height_px);
+
 // One picture: which camera, and which moment (the same for pictures taken together).
 struct CalibrationPicture {
     std::size_t camera = 0;

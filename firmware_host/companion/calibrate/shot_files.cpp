@@ -22,17 +22,6 @@ bool is_picture(const fs::path& path) {
     return ending == ".png" || ending == ".pgm" || ending == ".jpg" || ending == ".jpeg";
 }
 
-Result<std::vector<fs::path>, FileError> pictures_in(const fs::path& folder) {
-    std::error_code fault;
-    std::vector<fs::path> files;
-    for (fs::directory_iterator at(folder, fault), end; !fault && at != end; at.increment(fault)) {
-        if (is_picture(at->path())) files.push_back(at->path());
-    }
-    if (fault) return file_failure(folder, fmt::format("cannot be opened: {}", fault.message()));
-    std::ranges::sort(files);
-    return files;
-}
-
 struct NamedShots {
     std::string camera;
     std::map<std::string, fs::path> files;  // by moment
@@ -108,6 +97,17 @@ Result<ShotList, FileError> joined(std::vector<NamedShots> cameras) {
 }
 
 }  // namespace
+
+Result<std::vector<fs::path>, FileError> pictures_in(const fs::path& folder) {
+    std::error_code fault;
+    std::vector<fs::path> files;
+    for (fs::directory_iterator at(folder, fault), end; !fault && at != end; at.increment(fault)) {
+        if (is_picture(at->path())) files.push_back(at->path());
+    }
+    if (fault) return file_failure(folder, fmt::format("cannot be opened: {}", fault.message()));
+    std::ranges::sort(files);
+    return files;
+}
 
 Result<ShotList, FileError> find_shots(const std::vector<std::string>& arguments) {
     std::vector<NamedShots> cameras;

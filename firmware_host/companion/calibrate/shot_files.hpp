@@ -21,6 +21,10 @@ struct ShotList {
     std::vector<Shot> shots;  // by camera, then by moment
 };
 
+// The .png, .pgm, .jpg and .jpeg files of a folder, sorted by name; perhaps none. Error: it cannot be opened.
+[[nodiscard]] Result<std::vector<std::filesystem::path>, FileError> pictures_in(
+    const std::filesystem::path& folder);
+
 // One argument a camera: a folder (its .png, .pgm, .jpg and .jpeg files; the moment is the file's name
 // without ending, the camera's name the folder's) or a pattern with one * in the file's name (the moment is
 // what the * stands for, the camera's name what stands around it). Moments are the same when they are spelled

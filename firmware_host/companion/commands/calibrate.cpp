@@ -4,12 +4,15 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "core/pack/open_pack.hpp"
 #include "firmware_host/companion/calibrate/calibration.hpp"
 #include "firmware_host/companion/calibrate/coverage_picture.hpp"
 #include "firmware_host/companion/calibrate/headset_frame.hpp"
 #include "firmware_host/companion/calibrate/shot_files.hpp"
+#include "firmware_host/companion/commands/calibrate_live.hpp"
+#include "firmware_host/companion/commands/calibrate_reference.hpp"
 #include "firmware_host/companion/commands/console.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/train/camera_file.hpp"
@@ -27,6 +30,7 @@ struct CalibrateCommand {
     std::string make_board;
     std::vector<std::string> images;
     std::string by_name;
+    LiveOptions live;
     LensTerms terms = LensTerms::kRational;
     std::string reference;
     double distance_mm = 200.0;
@@ -153,30 +157,28 @@ void print_warnings(const CalibrationTask& task, const Calibration& result) {
     if (!result.converged) print_error("warning: the fit stopped at its cap before it settled");
 }
 
-// From the first camera's frame into the headset's. Empty when it could be done.
-std::string place_cameras(const CalibrateCommand& command, std::vector<CameraModel>& cameras) {
-    if (command.reference.empty()) {
+// From the first camera's frame into the headset's.
+void place_cameras(const CalibrateCommand& command, const RigReference* reference,
+                   std::vector<CameraModel>& cameras) {
+    if (reference == nullptr) {
         place_before_face(cameras, command.distance_mm);
         fmt::print(
             "headset frame: guessed from the way the cameras look (--reference FILE takes it from the "
             "helmet's "
-            "construction)\n");
-        return {};
+            "construction, or from the rig as it was)\n");
+        return;
     }
-    const auto reference = load_cameras(command.reference);
-    if (!reference) return reference.error().message;
-    if (reference->size() != cameras.size()) {
-        return fmt::format("{}: has {} cameras and there are pictures of {}; give them in the same order",
-                           command.reference, reference->size(), cameras.size());
-    }
-    const double off_mm = align_to_reference(cameras, *reference);
+    const double off_mm = align_to_reference(cameras, reference->cameras);
     fmt::print("headset frame: from {}; cameras stand {:.2f} mm rms from where it has them\n",
                command.reference, off_mm);
-    return {};
+    if (!reference->marks.empty()) {
+        fmt::print("reference marks of the helmet: {} carried over from {}\n", reference->marks.size(),
+                   command.reference);
+    }
 }
 
 int save_result(const CalibrateCommand& command, const CalibrationTask& task, const Calibration& result,
-                const std::vector<CameraModel>& cameras) {
+                const std::vector<CameraModel>& cameras, const std::vector<HelmetMark>& marks) {
     std::vector<CameraEntry> entries;
     for (std::size_t c = 0; c < cameras.size(); ++c) {
         if (!check_camera(cameras[c])) {
@@ -190,7 +192,7 @@ int save_result(const CalibrateCommand& command, const CalibrationTask& task, co
                            result.point_count[c]});
     }
     const auto saved =
-        save_cameras(command.out, entries, "headrig calibrate cameras, " + board_text(task.board));
+        save_cameras(command.out, entries, "headrig calibrate cameras, " + board_text(task.board), marks);
     if (!saved) {
         print_error(saved.error().message);
         return kExitOutput;
@@ -210,30 +212,20 @@ int save_result(const CalibrateCommand& command, const CalibrationTask& task, co
     return kExitOk;
 }
 
-int run_cameras(const CalibrateCommand& command) {
-    const auto board = parse_board(command.board);
-    if (!board) {
-        print_error(board.error().message);
-        return kExitUsage;
-    }
-    if (!command.make_board.empty()) return make_board(command, *board);
-    if (command.out.empty() || command.images.empty() == command.by_name.empty()) {
+int calibrate_shots(const CalibrateCommand& command, const BoardSpec& board, const ShotList& list,
+                    const RigReference* reference) {
+    if (reference != nullptr && reference->cameras.size() != list.cameras.size()) {
         print_error(
-            "give the pictures by --images, one folder or pattern a camera, or by --by-name, and --out");
-        return kExitUsage;
-    }
-    const auto list =
-        command.by_name.empty() ? find_shots(command.images) : find_shots_by_name(command.by_name);
-    if (!list) {
-        print_error(list.error().message);
+            fmt::format("{}: has {} cameras and there are pictures of {}; give them in the same order",
+                        command.reference, reference->cameras.size(), list.cameras.size()));
         return kExitInput;
     }
     CalibrationTask task;
-    task.camera_names = list->cameras;
-    task.board = *board;
+    task.camera_names = list.cameras;
+    task.board = board;
     task.terms = command.terms;
     task.row_time_us = command.row_time_us;
-    task.pictures = search_pictures(*list, *board);
+    task.pictures = search_pictures(list, board);
     if (interrupted()) return kExitInterrupted;
     Progress progress("fit", 1000);
     const auto result = calibrate(task, [&](double share) {
@@ -244,14 +236,81 @@ int run_cameras(const CalibrateCommand& command) {
         return kExitInput;
     }
     std::vector<CameraModel> cameras = result->cameras;
-    if (const std::string fault = place_cameras(command, cameras); !fault.empty()) {
-        print_error(fault);
-        return kExitInput;
-    }
+    place_cameras(command, reference, cameras);
     print_rejections(task, *result);
     print_cameras(task, *result, cameras);
     print_warnings(task, *result);
-    return save_result(command, task, *result, cameras);
+    return save_result(command, task, *result, cameras,
+                       reference != nullptr ? reference->marks : std::vector<HelmetMark>{});
+}
+
+int run_cameras(const CalibrateCommand& command) {
+    const auto board = parse_board(command.board);
+    if (!board) {
+        print_error(board.error().message);
+        return kExitUsage;
+    }
+    if (!command.make_board.empty()) return make_board(command, *board);
+    const int sources = (command.images.empty() ? 0 : 1) + (command.by_name.empty() ? 0 : 1) +
+                        (command.live.sources.empty() ? 0 : 1);
+    if (command.out.empty() || sources != 1) {
+        print_error(
+            "give the cameras by --live, or the pictures by --images, one folder or pattern a camera, or by "
+            "--by-name, and --out");
+        return kExitUsage;
+    }
+    // What stands in the way is said before anybody waves a board.
+    std::optional<RigReference> reference;
+    if (!command.reference.empty()) {
+        auto loaded = load_rig_reference(command.reference);
+        if (!loaded) {
+            print_error(loaded.error().message);
+            return kExitInput;
+        }
+        reference = std::move(*loaded);
+    } else if (const std::string stake = marks_at_stake(command.out); !stake.empty()) {
+        print_error(stake);
+        return kExitUsage;
+    }
+    std::vector<std::string> images = command.images;
+    if (!command.live.sources.empty()) {
+        const int taken = take_live_shots(command.live, *board, command.out, images);
+        if (taken != kExitOk) return taken;
+    }
+    const auto list = command.by_name.empty() ? find_shots(images) : find_shots_by_name(command.by_name);
+    if (!list) {
+        print_error(list.error().message);
+        return kExitInput;
+    }
+    return calibrate_shots(command, *board, *list, reference ? &*reference : nullptr);
+}
+
+void add_lens_option(CLI::App& verb, LensTerms& terms) {
+    const std::map<std::string, LensTerms> models = {{"rational", LensTerms::kRational},
+                                                     {"polynomial", LensTerms::kPolynomial},
+                                                     {"fisheye", LensTerms::kFisheye}};
+    verb.add_option(
+            "--model", terms,
+            "lens: rational (8 terms), polynomial (5 terms; for few pictures) or fisheye (4 terms; beyond "
+            "100 degrees across)")
+        ->transform(CLI::CheckedTransformer(models, CLI::ignore_case).description(""))
+        ->type_name("NAME")
+        ->default_str("rational");
+}
+
+void add_live_options(CLI::App& verb, LiveOptions& live) {
+    verb.add_option(
+            "--live", live.sources,
+            "instead: cameras to watch, [NAME=]SOURCE each: a device (/dev/video0, or 0), or a folder or "
+            "film that stands in for one. Shots are taken by themselves when the board is held still")
+        ->delimiter(',')
+        ->type_name("SOURCE...");
+    verb.add_option(
+            "--shots", live.shots,
+            "with --live: folder for the shots, one folder a camera; OUT_shots beside the result when "
+            "not given")
+        ->type_name("FOLDER");
+    verb.add_flag("--continue", live.go_on, "with --live: go on from the shots that are there");
 }
 
 void add_cameras_verb(CLI::App& calibrate_verb, int& exit_code) {
@@ -272,21 +331,14 @@ void add_cameras_verb(CLI::App& calibrate_verb, int& exit_code) {
         ->type_name("FOLDER...");
     verb->add_option("--by-name", command->by_name, "instead: one folder, pictures named MOMENT_CAMERA.png")
         ->type_name("FOLDER");
-    const std::map<std::string, LensTerms> models = {{"rational", LensTerms::kRational},
-                                                     {"polynomial", LensTerms::kPolynomial},
-                                                     {"fisheye", LensTerms::kFisheye}};
+    add_live_options(*verb, command->live);
+    add_lens_option(*verb, command->terms);
     verb->add_option(
-            "--model", command->terms,
-            "lens: rational (8 terms), polynomial (5 terms; for few pictures) or fisheye (4 terms; beyond "
-            "100 degrees across)")
-        ->transform(CLI::CheckedTransformer(models, CLI::ignore_case).description(""))
-        ->type_name("NAME")
-        ->default_str("rational");
-    verb->add_option("--reference", command->reference,
-                     "cameras.json with where the helmet's construction has the cameras, in the same order: "
-                     "the result "
-                     "is turned and moved onto it as a whole")
-        ->type_name("JSON");
+            "--reference", command->reference,
+            "cameras.json or pack with where the helmet's construction, or the last calibration, has the "
+            "cameras, in the same order: the result is turned and moved onto it as a whole, and the "
+            "helmet's reference marks of that file are carried over")
+        ->type_name("FILE");
     verb->add_option("--distance-mm", command->distance_mm,
                      "without --reference: from the camera to between nose and lips, where one camera or "
                      "parallel ones "
@@ -306,7 +358,10 @@ void add_cameras_verb(CLI::App& calibrate_verb, int& exit_code) {
     verb->footer(
         "Take 20 and more pictures a camera: sharp, the board tilted by 20 to 40 degrees this way and that, "
         "reaching "
-        "every corner of the picture, seen by two cameras at once as often as it can be.\n"
+        "every corner of the picture, seen by two cameras at once as often as it can be. --live does that "
+        "with "
+        "you: move the board, hold it still for half a second, go where it says. Enter or Ctrl-C ends the "
+        "pictures and calibrates.\n"
         "Columns: pictures used of all, points in them, rms distance of seen from computed points, share of "
         "the picture "
         "where the board was, focal lengths, centre (integers are pixel centres), standard deviation of the "
@@ -314,7 +369,10 @@ void add_cameras_verb(CLI::App& calibrate_verb, int& exit_code) {
         "length, place in the headset frame.\n"
         "Examples:\n"
         "  headrig calibrate cameras --board charuco:9x7:12 --make-board board.png\n"
-        "  headrig calibrate cameras --board charuco:9x7:12 --images shots/a shots/b --out cameras.json\n"
+        "  headrig calibrate cameras --board charuco:9x7:12 --live a=/dev/video0 b=/dev/video2 --out "
+        "cameras.json\n"
+        "  headrig calibrate cameras --board charuco:9x7:12 --images cameras_shots/a cameras_shots/b --out "
+        "cameras.json\n"
         "  headrig calibrate cameras --board circles:4x11:8 --images 'shots/left_*.png' 'shots/right_*.png' "
         "--model "
         "fisheye --out cameras.json\n"

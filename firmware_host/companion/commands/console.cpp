@@ -1,9 +1,11 @@
 #include "firmware_host/companion/commands/console.hpp"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <chrono>
 #include <csignal>
@@ -90,6 +92,18 @@ void install_interrupt_handler() {
 
 bool interrupted() {
     return g_interrupted != 0;
+}
+
+void clear_interrupt() {
+    g_interrupted = 0;
+}
+
+bool enter_pressed() {
+    if (isatty(STDIN_FILENO) != 1) return false;
+    pollfd waiting{STDIN_FILENO, POLLIN, 0};
+    if (poll(&waiting, 1, 0) != 1 || (waiting.revents & POLLIN) == 0) return false;
+    std::array<char, 256> line{};  // the terminal hands lines on whole
+    return read(STDIN_FILENO, line.data(), line.size()) > 0;
 }
 
 }  // namespace rig::host

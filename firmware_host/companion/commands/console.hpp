@@ -43,5 +43,10 @@ struct FrameRange {
 // True after Ctrl-C or SIGTERM, once install_interrupt_handler() ran.
 void install_interrupt_handler();
 [[nodiscard]] bool interrupted();
+// For a verb that Ctrl-C takes from one part of its work to the next.
+void clear_interrupt();
+
+// True when a person has pressed Enter since the last call; never when standard input is no terminal.
+[[nodiscard]] bool enter_pressed();
 
 }  // namespace rig::host

@@ -43,6 +43,8 @@ std::string_view message_word(MessageType type) {
             return "time replies";
         case MessageType::kWeights:
             return "weights";
+        case MessageType::kHeadPose:
+            return "head poses";
         case MessageType::kMarkers:
             return "markers";
         case MessageType::kStatus:

@@ -82,7 +82,7 @@ void watch(LinkSession& link, double seconds, double period_s, const std::functi
 int run_monitor(const MonitorOptions& options) {
     Gathered gathered;
     SessionOptions wanted;
-    wanted.streams = kStreamWeights | kStreamStatus;
+    wanted.streams = kStreamWeights | kStreamStatus | kStreamHead;
     wanted.weights_divider = options.divider;
     const auto link = LinkSession::open(options.link, wanted, gather_into(gathered));
     if (!link) return kExitDevice;

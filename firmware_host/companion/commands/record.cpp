@@ -11,6 +11,7 @@
 #include "firmware_host/companion/commands/link_session.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/files/npy.hpp"
+#include "firmware_host/companion/links/head_csv.hpp"
 #include "firmware_host/companion/links/recording.hpp"
 #include "firmware_host/companion/links/weights_csv.hpp"
 
@@ -33,6 +34,7 @@ struct RecordOptions {
 // Everything that is being written, and the first thing that went wrong with it.
 struct Taking {
     std::optional<WeightsCsv> csv;
+    std::optional<HeadCsv> head;  // of a rig whose cameras are not on it
     std::optional<RecordingWriter> raw;
     std::vector<std::uint32_t> sequences;                        // of the rows of the CSV
     std::unordered_map<std::uint32_t, std::size_t> marker_rows;  // sequence -> place in marker_values
@@ -61,6 +63,7 @@ void take_state(Taking& taking, const ReceivedState& received) {
         return;
     }
     taking.sequences.push_back(received.state.sequence);
+    if (taking.head) taking.keep(taking.head->add(received.state));
     // A held state's capture is old by design; its age says so.
     if (received.latency_us && !received.state.held) taking.latencies_us.push_back(*received.latency_us);
 }
@@ -119,6 +122,10 @@ void print_summary(const RecordOptions& options, const Taking& taking, const Hos
     fmt::print("{}: {} states of {} shapes, missing {}, frames lost {}, damaged {}\n{}\n", options.out,
                taking.csv->row_count(), session.shape_names().size(), counters.states_missing,
                counters.frames_lost, session.frames().bad(), latency_summary(taking.latencies_us));
+    if (taking.head) {
+        fmt::print("{}: head pose known in {} of {} states\n", head_csv_path(options.out).string(),
+                   taking.head->known_count(), taking.head->row_count());
+    }
     if (taking.raw) fmt::print("{}: {} frames\n", options.raw, taking.raw->frame_count());
     if (!options.markers.empty()) {
         fmt::print("{}: {} x {} markers\n", options.markers, taking.sequences.size(), taking.marker_count);
@@ -177,6 +184,7 @@ LinkSession::End take_it(const RecordOptions& options, Taking& taking, LinkSessi
 
 int finish(const RecordOptions& options, Taking& taking, LinkSession& link, LinkSession::End end) {
     taking.keep(taking.csv->close());
+    if (taking.head) taking.keep(taking.head->close());
     if (taking.raw) taking.keep(taking.raw->close());
     if (!options.markers.empty() && !taking.fault) taking.keep(save_markers(taking, options.markers));
     print_summary(options, taking, link.session());
@@ -201,7 +209,7 @@ int run_record(const RecordOptions& options) {
         taking.raw = std::move(*raw);
     }
     SessionOptions wanted;
-    wanted.streams = kStreamWeights | kStreamStatus;
+    wanted.streams = kStreamWeights | kStreamStatus | kStreamHead;
     if (!options.markers.empty()) wanted.streams |= kStreamMarkers;
     const auto link = LinkSession::open(options.link, wanted, events_into(taking));
     if (!link) return kExitDevice;
@@ -215,6 +223,14 @@ int run_record(const RecordOptions& options) {
         return kExitOutput;
     }
     taking.csv = std::move(*csv);
+    if (session.tells_head()) {
+        auto head = HeadCsv::create(head_csv_path(options.out));
+        if (!head) {
+            print_error(head.error().message);
+            return kExitOutput;
+        }
+        taking.head = std::move(*head);
+    }
     const auto end = take_it(options, taking, *link);
     session.leave();
     return finish(options, taking, *link, end);
@@ -242,6 +258,8 @@ void add_record_verb(CLI::App& app, int& exit_code) {
         ->default_str("")
         ->type_name("N");
     verb->footer(
+        "A rig whose cameras are not on the head also tells where that is: OUT.head.csv, beside the "
+        "weights.\n"
         "Without a limit Ctrl-C ends it; files are whole at any time. A rig that goes away is waited for 5 "
         "s.\nExamples:\n"
         "  headrig record --link /dev/pts/5 --out take.csv --seconds 20\n"

@@ -100,6 +100,8 @@ void HostSession::take_message(const FrameView& frame, std::int64_t now_us) {
             return;
         case MessageType::kWeights:
             return take_weights(frame.payload, now_us);
+        case MessageType::kHeadPose:
+            return take_head(frame.payload);
         case MessageType::kMarkers:
             return take_markers(frame.payload, now_us);
         case MessageType::kStatus:
@@ -134,6 +136,7 @@ void HostSession::take_hello(const Result<Hello, WireError>& hello) {
     if (!same_board) {
         states_.reset();
         markers_.reset();
+        head_.reset();
         time_sync_.reset();
         times_asked_ = 0;
         last_state_.reset();
@@ -238,7 +241,9 @@ void HostSession::take_weights(ByteSpan payload, std::int64_t now_us) {
     }
     last_weights_us_ = now_us;
     if (!states_.push(*part)) return;
-    const FaceState& state = states_.state();
+    whole_ = states_.state();
+    if (head_ && head_->sequence == whole_.sequence) whole_.head = head_->head;
+    const FaceState& state = whole_;
     count_state_gap(state.sequence);
     ++counters_.states;
     if (!events_.state) return;
@@ -246,6 +251,16 @@ void HostSession::take_weights(ByteSpan payload, std::int64_t now_us) {
     if (const auto captured_us = time_sync_.host_time_us(state.capture_us))
         received.latency_us = now_us - *captured_us;
     events_.state(received);
+}
+
+// Comes before the weights of its tick; one whose weights are lost is replaced by the next.
+void HostSession::take_head(ByteSpan payload) {
+    const auto head = decode_head_pose(payload);
+    if (!head) {
+        ++counters_.refused;
+        return;
+    }
+    head_ = *head;
 }
 
 void HostSession::take_markers(ByteSpan payload, std::int64_t now_us) {
@@ -347,10 +362,13 @@ void HostSession::ask(std::int64_t now_us) {
         }
         case SessionPhase::kNaming:
             return ask_names();
-        case SessionPhase::kStarting:
-            return send(MessageType::kStartStreams,
-                        StartStreams{options_.streams, options_.weights_divider, options_.markers_divider,
-                                     options_.status_divider});
+        case SessionPhase::kStarting: {
+            const int refused = tells_head() ? 0 : kStreamHead;  // by boards that do not know it
+            return send(
+                MessageType::kStartStreams,
+                StartStreams{static_cast<std::uint8_t>(options_.streams & ~refused), options_.weights_divider,
+                             options_.markers_divider, options_.status_divider});
+        }
         case SessionPhase::kRefused:
             if (!first_time) enter(SessionPhase::kGreeting);
             return;

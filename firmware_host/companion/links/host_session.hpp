@@ -31,7 +31,8 @@ enum class SessionPhase : std::uint8_t {
 };
 
 struct SessionOptions {
-    std::uint8_t streams = kStreamWeights;  // 0: only look, own nothing
+    // 0: only look, own nothing. kStreamHead is asked of boards that have it; states then hold the head.
+    std::uint8_t streams = kStreamWeights;
     std::uint16_t weights_divider = 1;
     std::uint16_t markers_divider = 1;
     std::uint16_t status_divider = 60;
@@ -100,6 +101,8 @@ class HostSession {
 
     [[nodiscard]] SessionPhase phase() const { return phase_; }
     [[nodiscard]] const std::optional<Hello>& hello() const { return hello_; }
+    // The board's cameras are not on the head, and it tells where that is.
+    [[nodiscard]] bool tells_head() const { return hello_ && (hello_->capabilities & kCanStreamHead) != 0; }
     [[nodiscard]] const std::vector<std::string>& shape_names() const { return shape_names_; }
     [[nodiscard]] const std::vector<std::string>& marker_names() const { return marker_names_; }
     [[nodiscard]] const TimeSync& time_sync() const { return time_sync_; }
@@ -121,6 +124,7 @@ class HostSession {
     void take_ack(ByteSpan payload);
     void take_nak(ByteSpan payload);
     void take_weights(ByteSpan payload, std::int64_t now_us);
+    void take_head(ByteSpan payload);
     void take_markers(ByteSpan payload, std::int64_t now_us);
     void take_time(ByteSpan payload, std::int64_t now_us);
     void take_status(ByteSpan payload);
@@ -177,6 +181,8 @@ class HostSession {
 
     FrameDecoder decoder_;
     StateAssembler states_;
+    FaceState whole_;  // the last state, with the head of its tick
+    std::optional<HeadPoseMessage> head_;
     MarkerAssembler markers_;
     std::optional<std::uint32_t> last_frame_;
     std::optional<std::uint32_t> last_state_;

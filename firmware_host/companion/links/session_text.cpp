@@ -41,6 +41,18 @@ std::string_view camera_word(CameraStatus status) {
     return index < kWords.size() ? kWords[index] : "?";
 }
 
+std::string_view head_word(HeadStatus status) {
+    constexpr std::array<std::string_view, 7> kWords = {"no face",
+                                                        "known",
+                                                        "too few markers",
+                                                        "markers in a plane",
+                                                        "behind the cameras",
+                                                        "uncertain",
+                                                        "the markers disagree"};
+    const auto index = static_cast<std::size_t>(status);
+    return index < kWords.size() ? kWords[index] : "?";
+}
+
 std::vector<std::string> hello_lines(const Hello& hello) {
     std::vector<std::string> lines;
     lines.push_back(fmt::format("rig: {}", hello.serial.view().empty() ? "(no name)" : hello.serial.view()));

@@ -13,6 +13,8 @@ namespace rig::host {
 
 [[nodiscard]] std::string_view state_word(TrackingState state);
 [[nodiscard]] std::string_view camera_word(CameraStatus status);
+// "known", or why nobody knows where the head is.
+[[nodiscard]] std::string_view head_word(HeadStatus status);
 
 // One fact a line, "label: value".
 [[nodiscard]] std::vector<std::string> hello_lines(const Hello& hello);

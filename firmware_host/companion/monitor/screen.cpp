@@ -105,6 +105,19 @@ std::string camera_line(const MonitorModel& model) {
     return text;
 }
 
+// Where the head is, or why nobody knows; empty for cameras that are on it.
+std::string head_line(const MonitorModel& model) {
+    const bool told = model.hello && (model.hello->capabilities & kCanStreamHead) != 0;
+    if (!told) return {};
+    const HeadPlace& head = model.state->head;
+    if (head.status != HeadStatus::kKnown) return fmt::format("head pose: {}", head_word(head.status));
+    constexpr float kDegrees = 57.29578F;
+    return fmt::format(
+        "head pose: turn {:.1f} {:.1f} {:.1f} degrees  place {:.1f} {:.1f} {:.1f} mm  rms {:.2f} px",
+        head.rotation_rad[0] * kDegrees, head.rotation_rad[1] * kDegrees, head.rotation_rad[2] * kDegrees,
+        head.translation_mm[0], head.translation_mm[1], head.translation_mm[2], head.rms_px);
+}
+
 void add_faults(const MonitorModel& model, std::size_t columns, bool colour,
                 std::vector<std::string>& lines) {
     const std::vector<int> faults = faults_of(model.state->faults);
@@ -203,6 +216,8 @@ std::vector<std::string> monitor_screen(const MonitorModel& model, ScreenSize si
     lines.push_back(state_line(model, size.columns, colour));
     if (model.state) {
         lines.push_back(fitted(camera_line(model), size.columns));
+        if (const std::string head = head_line(model); !head.empty())
+            lines.push_back(fitted(head, size.columns));
         add_faults(model, size.columns, colour, lines);
         if (!model.last_event.empty()) lines.push_back(fitted("last: " + model.last_event, size.columns));
         lines.emplace_back();
@@ -230,11 +245,12 @@ std::string monitor_line(const MonitorModel& model, double elapsed_s) {
     if (const auto index = static_cast<std::size_t>(peak - first); index < model.shape_names.size()) {
         strongest = fmt::format("{}={:.3f}", model.shape_names[index], *peak);
     }
+    const std::string head = head_line(model);
     return fmt::format(
-        "{:.1f} s: {}{} rate {:.1f} Hz latency {} missing {} lost {} damaged {} faults {} strongest {}",
+        "{:.1f} s: {}{} rate {:.1f} Hz latency {} missing {} lost {} damaged {} faults {} strongest {}{}{}",
         elapsed_s, state_word(state.state), state.held ? " held" : "", model.rate_hz, latency_text(model),
         model.counters.states_missing, model.counters.frames_lost, model.bad_frames,
-        faults.empty() ? "none" : faults, strongest);
+        faults.empty() ? "none" : faults, strongest, head.empty() ? "" : " ", head);
 }
 
 }  // namespace rig::host

@@ -29,6 +29,7 @@ PipelineConfig config_of(const ObservationLogHeader& header) {
     PipelineConfig config;
     config.filter = header.filter;
     config.stabilise = header.stabilise;
+    config.camera_on_head = header.camera_on_head;
     config.smoothing = header.smoothing;
     config.rate_hz = static_cast<double>(header.rate_millihertz) * 1e-3;
     config.loss_policy = header.loss_policy == 1 ? LossPolicy::kDecay : LossPolicy::kHold;

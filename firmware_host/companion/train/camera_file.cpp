@@ -118,6 +118,15 @@ nlohmann::ordered_json entry_of(const CameraEntry& entry) {
     return out;
 }
 
+nlohmann::ordered_json mark_json(const HelmetMark& mark, std::span<const CameraEntry> cameras) {
+    nlohmann::ordered_json out{{"headset_mm", {mark.headset_mm[0], mark.headset_mm[1], mark.headset_mm[2]}}};
+    nlohmann::ordered_json names = nlohmann::ordered_json::array();
+    for (std::size_t c = 0; c < cameras.size(); ++c)
+        if (mark.is_seen_by(c)) names.push_back(cameras[c].name);
+    if (names.size() < cameras.size()) out["cameras"] = names;
+    return out;
+}
+
 // The entries that are cameras, one for each letter.
 std::vector<const json*> camera_entries(const json& file) {
     std::vector<const json*> entries;
@@ -264,7 +273,7 @@ Result<std::vector<CameraModel>, FileError> load_cameras(const std::filesystem::
 }
 
 Result<void, FileError> save_cameras(const std::filesystem::path& path, std::span<const CameraEntry> cameras,
-                                     const std::string& note) {
+                                     const std::string& note, std::span<const HelmetMark> marks) {
     nlohmann::ordered_json file;
     file["note"] = note;
     file["units"] =
@@ -272,6 +281,7 @@ Result<void, FileError> save_cameras(const std::filesystem::path& path, std::spa
         "camera axes x right, y down, z forward; row_time_us in microseconds a row";
     file["cameras"] = nlohmann::ordered_json::array();
     for (const CameraEntry& camera : cameras) file["cameras"].push_back(entry_of(camera));
+    for (const HelmetMark& mark : marks) file["reference_marks"].push_back(mark_json(mark, cameras));
     std::ofstream out(path, std::ios::trunc);
     out << file.dump(1) << '\n';
     out.close();

@@ -50,9 +50,11 @@ struct CameraEntry {
     std::size_t point_count = 0;  // points in them
 };
 
-// Writes a cameras.json that load_cameras() reads, 17 digits each. `note` says where it comes from.
+// Writes a cameras.json that load_cameras() and load_reference_marks() read, 17 digits each. `note` says
+// where it comes from. Marks: cameras by their place in `cameras`.
 [[nodiscard]] Result<void, FileError> save_cameras(const std::filesystem::path& path,
                                                    std::span<const CameraEntry> cameras,
-                                                   const std::string& note);
+                                                   const std::string& note,
+                                                   std::span<const HelmetMark> marks = {});
 
 }  // namespace rig::host

@@ -36,6 +36,10 @@ void assemble(rig::ByteSpan payload) {
         }
         require(states.counters().whole + states.counters().abandoned + states.counters().stale <= 16);
     }
+    if (const auto message = rig::decode_head_pose(payload)) {
+        for (const float value : message->head.translation_sigma_mm) require(value >= 0.0F && value <= 1e6F);
+        require(message->head.status == rig::HeadStatus::kKnown || message->head.points_used == 0);
+    }
     if (const auto part = rig::decode_markers(payload)) {
         (void)markers.push(*part);
         (void)markers.push(*part);

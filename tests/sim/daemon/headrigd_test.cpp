@@ -138,6 +138,24 @@ TEST_F(DaemonProgram, RunsAWorldToItsEnd) {
     EXPECT_EQ(digests[0], digests[1]);
 }
 
+// A take solved again must know how the cameras stood.
+TEST_F(DaemonProgram, ALogTellsWhetherTheCamerasWereOnTheHead) {
+    for (const bool on_head : {true, false}) {
+        FakeWorld world(sim::WorldPace::kLockstep);
+        world.perform(5);
+        const std::string log = folder_ / "take.rgo";
+        std::vector<std::string> arguments{"--world",      world.path(),         "--link",
+                                           "pty:" + line_, "--log-observations", log};
+        if (!on_head) arguments.emplace_back("--cameras-off-head");
+        EXPECT_EQ(run(arguments), 0) << text("err");
+        world.wait_performed();
+        const std::string bytes = text("take.rgo");
+        const auto reader = ObservationLogReader::open(std::as_bytes(std::span(bytes)));
+        ASSERT_TRUE(reader.has_value());
+        EXPECT_EQ(reader->header().camera_on_head, on_head);
+    }
+}
+
 TEST_F(DaemonProgram, RunsInRealTimeWithoutHeapCalls) {
     setenv("RIG_HEAP_GUARD", "abort", 1);
     FakeWorld world(sim::WorldPace::kRealTime);

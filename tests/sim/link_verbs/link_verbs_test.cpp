@@ -213,6 +213,26 @@ TEST_F(LinkVerbs, RecordWritesWhatWasSent) {
     EXPECT_TRUE(has(info.out, "rig: test-rig"));
 }
 
+TEST_F(LinkVerbs, RecordAndMonitorTellTheHeadOfARigWhoseCamerasAreNotOnIt) {
+    const auto board = board_on_pty({.tells_head = true});
+    const Ran ran = run({"record", "--link", path("rig"), "--out", path("w.csv"), "--frames", "40"});
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_TRUE(has(ran.out, "w.head.csv: head pose known in 30 of 40 states")) << ran.out;
+    const std::string head = text_of(path("w.head.csv"));
+    EXPECT_TRUE(has(head, "frame,time_s,status,turn_x_rad")) << head;
+    EXPECT_TRUE(has(head, ",too few markers,")) << head;
+    EXPECT_EQ(std::count(head.begin(), head.end(), '\n'), 41);
+    const Ran watched = run({"monitor", "--link", path("rig"), "--seconds", "1.5"});
+    EXPECT_TRUE(has(watched.out, "head pose: ")) << watched.out;
+}
+
+TEST_F(LinkVerbs, ARigOnTheHeadHasNoTableOfHeadPoses) {
+    const auto board = board_on_pty();
+    const Ran ran = run({"record", "--link", path("rig"), "--out", path("w.csv"), "--frames", "20"});
+    EXPECT_EQ(ran.exit_code, 0) << ran.err;
+    EXPECT_FALSE(std::filesystem::exists(path("w.head.csv")));
+}
+
 TEST_F(LinkVerbs, RecordWithoutALimitEndsWellOnCtrlC) {
     const auto board = board_on_pty();
     const Ran ran = run({"record", "--link", path("rig"), "--out", path("w.csv")}, 1.5);

@@ -85,6 +85,8 @@ Result<Bytes, WireError> reencoded(MessageType type, ByteSpan payload) {
             return weights_again(payload);
         case MessageType::kMarkers:
             return markers_again(payload);
+        case MessageType::kHeadPose:
+            return again(decode_head_pose(payload));
         case MessageType::kStatus:
             return again(decode_status(payload));
         case MessageType::kEvent:

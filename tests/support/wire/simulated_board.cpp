@@ -79,6 +79,7 @@ void SimulatedBoard::take(const FrameView& frame, std::int64_t now_us) {
             return send_status(now_us);
         case MessageType::kStartStreams:
             if (const auto start = decode_start_streams(frame.payload)) {
+                if ((start->mask & kStreamHead) != 0 && !options_.tells_head) return answer(frame, false);
                 streams_ |= start->mask;
                 dividers_ = *start;
             }
@@ -134,6 +135,13 @@ void SimulatedBoard::tick(std::int64_t now_us) {
     }
     std::array<std::byte, kMaxWirePayloadBytes> payload;
     if ((streams_ & kStreamWeights) != 0 && tick_ % dividers_.weights_divider == 0) {
+        if ((streams_ & kStreamHead) != 0) {
+            HeadPlace head;
+            head.status = tick_ % 4 == 3 ? HeadStatus::kTooFew : HeadStatus::kKnown;
+            head.capture_us = state.capture_us;
+            head.translation_mm = {static_cast<float>(tick_), 0.0F, -2.5F};
+            send(MessageType::kHeadPose, HeadPoseMessage{tick_, head});
+        }
         for (std::size_t part = 0; part < weights_part_count(state.shape_count); ++part) {
             const auto size = encode_weights(state, part, payload);
             send(MessageType::kWeights, ByteSpan(payload).first(size.value_or(0)));
@@ -156,6 +164,7 @@ void SimulatedBoard::send_hello() {
     hello.pack_unsigned = true;
     hello.session_id = options_.session_id;
     hello.capabilities = kCanStreamMarkers | kCanResetTracking | kIsSimulated;
+    if (options_.tells_head) hello.capabilities |= kCanStreamHead;
     hello.shape_count = static_cast<std::uint16_t>(options_.shape_count);
     hello.marker_count = static_cast<std::uint16_t>(options_.marker_count);
     hello.rate_mhz = 60000;

@@ -27,6 +27,7 @@ struct BoardOptions {
     std::uint32_t session_id = 0xB0A4D;
     bool busy = false;  // another host owns the session
     FaultMap faults = 0;
+    bool tells_head = false;  // capability and stream; a board without refuses the stream, as older ones do
 };
 
 class SimulatedBoard {

@@ -130,6 +130,16 @@ TEST(WireProperties, AnyFloatBitsGiveAPayloadThatTheDecoderTakes) {
         const auto size = encode_markers(markers, 1, buffer);
         ASSERT_TRUE(size.has_value());
         ASSERT_TRUE(decode_markers(ByteSpan(buffer).first(*size)).has_value());
+        HeadPoseMessage head;
+        head.head.status = static_cast<HeadStatus>(random.below(7));
+        head.head.capture_us = static_cast<std::int64_t>(random.bits());
+        head.head.points_used = static_cast<std::uint16_t>(random.bits());
+        head.head.rotation_rad = {any_float(), any_float(), any_float()};
+        head.head.translation_sigma_mm = {any_float(), any_float(), any_float()};
+        head.head.rms_px = any_float();
+        const auto head_size = encode(head, buffer);
+        ASSERT_TRUE(head_size.has_value());
+        ASSERT_TRUE(decode_head_pose(ByteSpan(buffer).first(*head_size)).has_value());
     }
 }
 

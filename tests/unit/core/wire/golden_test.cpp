@@ -113,6 +113,20 @@ Bytes example_markers() {
     return taken(buffer, encode_markers(frame, 0, buffer));
 }
 
+HeadPoseMessage example_head_pose() {
+    HeadPoseMessage message;
+    message.sequence = 1000;
+    message.head.status = HeadStatus::kKnown;
+    message.head.capture_us = 16666667;
+    message.head.points_used = 118;
+    message.head.rotation_rad = {0.0625F, -0.125F, 0.0F};
+    message.head.translation_mm = {10.5F, -3.0F, 40.25F};
+    message.head.rotation_sigma_rad = {1.0F / 1024.0F, 1.0F / 1024.0F, 1.0F / 512.0F};
+    message.head.translation_sigma_mm = {0.25F, 0.25F, 0.5F};
+    message.head.rms_px = 0.25F;
+    return message;
+}
+
 Health example_health() {
     Health health;
     health.now_us = 90000000;
@@ -186,6 +200,7 @@ std::map<std::string, Example> examples() {
         {"status_request", {MessageType::kStatusRequest, 0, 15, {}}},
         {"command", {MessageType::kCommand, 0, 16, payload_of(CommandMessage{BoardCommand::kResetTracking})}},
         {"control", {MessageType::kControl, 0, 19, payload_of(example_control())}},
+        {"head_pose", {MessageType::kHeadPose, 1, 20, payload_of(example_head_pose())}},
         {"ack", {MessageType::kAck, 1, 17, payload_of(AckMessage{0x20, 13})}},
         {"nak", {MessageType::kNak, 1, 18, payload_of(NakMessage{NakReason::kBadLength, 0x21, 14})}},
     };

@@ -49,7 +49,7 @@ TEST(ReadStream, HasAtMostSixtyLines) {
 TEST(ReadStream, PrintsTheGoldenFrames) {
     if (!has_python()) GTEST_SKIP() << "no python3";
     const auto lines = printed(test::golden_stream(test::load_golden_frames()));
-    ASSERT_EQ(lines.size(), 19U);
+    ASSERT_EQ(lines.size(), 20U);
     const auto has = [&](const std::string& wanted) {
         EXPECT_TRUE(std::find(lines.begin(), lines.end(), wanted) != lines.end()) << wanted;
     };
@@ -59,6 +59,8 @@ TEST(ReadStream, PrintsTheGoldenFrames) {
         "1.0000 -0.2500");
     has("1 10 markers state 1000 capture_us 16666667 markers 2 first 0 count 2");
     has("1 11 status up 60000000 us, ticks 3600 solved 3590 held 10 overruns 2 sent 3599 dropped 1");
+    has("1 20 head pose state 1000 capture_us 16666667 status 1 turn 0.0625 -0.1250 0.0000 place 10.50 -3.00 "
+        "40.25");
     has("1 12 event camera 1 is gone");
     EXPECT_TRUE(std::any_of(lines.begin(), lines.end(), [](const std::string& line) {
         return line.starts_with("0 19 control 01 01 02");

@@ -139,7 +139,7 @@ TEST(SessionMessages, RangesAreChecked) {
     EXPECT_EQ(encode(TimeRequest{kMaxWireTime_us + 1}, buffer).error(), WireError::kRange);
     EXPECT_EQ(encode(TimeReply{0, 10, 9}, buffer).error(), WireError::kRange);
     EXPECT_EQ(encode(StartStreams{0, 1, 1, 1}, buffer).error(), WireError::kRange);
-    EXPECT_EQ(encode(StartStreams{8, 1, 1, 1}, buffer).error(), WireError::kRange);
+    EXPECT_EQ(encode(StartStreams{16, 1, 1, 1}, buffer).error(), WireError::kRange);
     EXPECT_EQ(encode(StartStreams{1, 0, 1, 1}, buffer).error(), WireError::kRange);
     EXPECT_EQ(encode(StartStreams{1, 1, 0, 1}, buffer).error(), WireError::kRange);
     EXPECT_EQ(encode(StartStreams{1, 1, 1, 0}, buffer).error(), WireError::kRange);

@@ -285,4 +285,82 @@ TEST(Markers, ComeFromTracking) {
     EXPECT_EQ(frame.markers[1], (MarkerSample{true, 3, {1.0F, 2.0F, 3.5F}}));
 }
 
+HeadPoseMessage known_head() {
+    HeadPoseMessage message;
+    message.sequence = 77;
+    message.head.capture_us = 123456789;
+    message.head.status = HeadStatus::kKnown;
+    message.head.points_used = 96;
+    message.head.rotation_rad = {0.1F, -0.0F, 3.0F};
+    message.head.translation_mm = {-400.5F, 12.0F, 900.0F};
+    message.head.rotation_sigma_rad = {0.01F, 0.02F, 0.03F};
+    message.head.translation_sigma_mm = {1.0F, 2.0F, 3.0F};
+    message.head.rms_px = 0.4F;
+    return message;
+}
+
+TEST(HeadPose, WhatIsKnownComesBackAndWhatIsNotIsZero) {
+    HeadPoseMessage message = known_head();
+    Buffer buffer;
+    ASSERT_EQ(encode(message, buffer).value(), kHeadPoseBytes);
+    const auto got = decode_head_pose(ByteSpan(buffer).first(kHeadPoseBytes));
+    ASSERT_TRUE(got.has_value());
+    EXPECT_EQ(got->sequence, 77U);
+    EXPECT_EQ(got->head.capture_us, 123456789);
+    EXPECT_EQ(got->head.points_used, 96);
+    EXPECT_EQ(got->head.rotation_rad, message.head.rotation_rad);
+    EXPECT_EQ(got->head.translation_mm, message.head.translation_mm);
+    EXPECT_EQ(got->head.rotation_sigma_rad, message.head.rotation_sigma_rad);
+    EXPECT_EQ(got->head.translation_sigma_mm, message.head.translation_sigma_mm);
+    EXPECT_EQ(got->head.rms_px, 0.4F);
+    message.head.status = HeadStatus::kFlat;
+    ASSERT_TRUE(encode(message, buffer).has_value());
+    const auto flat = decode_head_pose(ByteSpan(buffer).first(kHeadPoseBytes));
+    ASSERT_TRUE(flat.has_value());
+    EXPECT_EQ(flat->head.status, HeadStatus::kFlat);
+    EXPECT_EQ(flat->head.capture_us, 123456789);
+    EXPECT_EQ(flat->head.points_used, 0);
+    EXPECT_EQ(flat->head.rotation_rad, (std::array<float, 3>{}));
+    EXPECT_EQ(flat->head.rms_px, 0.0F);
+}
+
+TEST(HeadPose, NumbersThatCannotBeSentMakeItUncertain) {
+    const auto status_with = [](const HeadPoseMessage& message) {
+        Buffer buffer;
+        EXPECT_TRUE(encode(message, buffer).has_value());
+        const auto got = decode_head_pose(ByteSpan(buffer).first(kHeadPoseBytes));
+        EXPECT_TRUE(got.has_value());
+        return got.value_or(HeadPoseMessage{}).head.status;
+    };
+    for (const float bad : {kNan, kInf, 2e6F, -2e6F}) {
+        HeadPoseMessage message = known_head();
+        message.head.translation_mm[1] = bad;
+        EXPECT_EQ(status_with(message), HeadStatus::kUncertain) << bad;
+    }
+    HeadPoseMessage negative = known_head();
+    negative.head.rms_px = -0.1F;
+    EXPECT_EQ(status_with(negative), HeadStatus::kUncertain);
+}
+
+TEST(HeadPose, DecodingIsStrict) {
+    Buffer good;
+    ASSERT_TRUE(encode(known_head(), good).has_value());
+    EXPECT_EQ(decode_head_pose(ByteSpan(good).first(kHeadPoseBytes - 1)).error(), WireError::kLength);
+    EXPECT_EQ(decode_head_pose(ByteSpan(good).first(kHeadPoseBytes + 1)).error(), WireError::kLength);
+    const auto with = [&good](std::size_t at, std::uint8_t value) {
+        Buffer bytes = good;
+        bytes[at] = std::byte{value};
+        return decode_head_pose(ByteSpan(bytes).first(kHeadPoseBytes));
+    };
+    EXPECT_TRUE(with(12, 1).has_value());
+    EXPECT_EQ(with(12, 7).error(), WireError::kRange) << "no such status";
+    EXPECT_EQ(with(13, 1).error(), WireError::kRange) << "reserved";
+    EXPECT_EQ(with(12, 2).error(), WireError::kRange) << "not known, yet with numbers";
+    EXPECT_EQ(with(67, 0xff).error(), WireError::kRange) << "no number of pixels";
+    HeadPoseMessage message = known_head();
+    EXPECT_EQ(encode(message, MutableByteSpan(good).first(kHeadPoseBytes - 1)).error(), WireError::kSpace);
+    message.head.status = static_cast<HeadStatus>(7);
+    EXPECT_EQ(encode(message, good).error(), WireError::kRange);
+}
+
 }  // namespace

@@ -163,6 +163,32 @@ TEST_F(LinkPortTest, DividersThin) {
     EXPECT_EQ(sequences, (std::vector<std::uint32_t>{0, 3, 6, 9}));
 }
 
+TEST_F(LinkPortTest, TheHeadGoesBeforeTheWeightsOfItsTickAndOnlyWithThem) {
+    start(kStreamWeights | kStreamHead, 2);
+    link_.budget = 1'000'000;
+    for (std::uint32_t tick = 0; tick < 4; ++tick) {
+        port_.offer(output(tick, 3, 0));
+        port_.pump_out();
+    }
+    port_.stop_streams(kStreamWeights);
+    port_.offer(output(4, 3, 0));
+    port_.pump_out();
+    EXPECT_EQ(decode(link_.received).types,
+              (std::vector<MessageType>{MessageType::kHeadPose, MessageType::kWeights, MessageType::kHeadPose,
+                                        MessageType::kWeights}));
+    EXPECT_EQ(port_.health(Health{}).frames_sent, 2U);
+    FrameDecoder decoder;
+    ByteSpan chunk(link_.received);
+    FrameView frame;
+    for (const std::uint32_t tick : {0U, 2U}) {
+        ASSERT_TRUE(decoder.next(chunk, frame));
+        const auto head = decode_head_pose(frame.payload);
+        ASSERT_TRUE(head.has_value());
+        EXPECT_EQ(head->sequence, tick);
+        ASSERT_TRUE(decoder.next(chunk, frame));
+    }
+}
+
 TEST_F(LinkPortTest, AReplacedTickHandsOnWhatItOwed) {
     start(kStreamWeights);
     port_.start_streams(StartStreams{kStreamStatus, 1, 1, 5});

@@ -18,6 +18,7 @@ ObservationLogHeader header() {
     result.camera_count = 2;
     result.rate_millihertz = 60'000;
     result.stabilise = false;
+    result.camera_on_head = false;
     result.loss_policy = 1;
     result.pack_hash.fill(std::byte{0x5C});
     result.smoothing.delay_frames = 4;

@@ -6,10 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "firmware_host/companion/commands/calibrate_reference.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
 #include "firmware_host/companion/files/image_file.hpp"
 #include "firmware_host/companion/train/camera_file.hpp"
+#include "firmware_host/companion/train/pack_writer.hpp"
 #include "tests/support/board_scene/board_scene.hpp"
+#include "tests/support/pack_samples/sample_pack.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/text_checks.hpp"
 #include "tests/unit/firmware_host/companion/commands/verb_run.hpp"
@@ -110,6 +113,139 @@ TEST_F(CalibrateVerb, AReferencePutsTheRigWhereTheHelmetHasIt) {
     const test::VerbOutcome refused = run(all);
     EXPECT_EQ(refused.exit_code, host::kExitInput);
     EXPECT_TRUE(has(refused.err, "has 1 cameras and there are pictures of 2")) << refused.err;
+}
+
+TEST_F(CalibrateVerb, TheHelmetsMarksAreCarriedOverAndNeverLostInSilence) {
+    copy_shots();
+    const std::vector<host::CameraEntry> entries{{"left", (*truth)[0]}, {"right", (*truth)[1]}};
+    const std::vector<HelmetMark> marks{{Vec3{-70.0, 66.0, 12.5}, 3}, {Vec3{70.0, 66.0, 12.0}, 2}};
+    ASSERT_TRUE(host::save_cameras(at("cameras.json"), entries, "the rig as it was", marks).has_value());
+    const test::VerbOutcome refused = run(arguments());
+    EXPECT_EQ(refused.exit_code, host::kExitUsage);
+    EXPECT_TRUE(has(refused.err, "holds 2 reference marks") && has(refused.err, "--reference"))
+        << refused.err;
+    ASSERT_EQ(host::load_reference_marks(at("cameras.json"))->size(), 2U) << "the file is as it was";
+
+    std::vector<std::string> all = arguments();
+    for (const std::string& more : {std::string("--reference"), at("cameras.json")}) all.push_back(more);
+    const test::VerbOutcome outcome = run(all);
+    ASSERT_EQ(outcome.exit_code, host::kExitOk) << outcome.err;
+    EXPECT_TRUE(has(outcome.out, "reference marks of the helmet: 2 carried over")) << outcome.out;
+    const auto kept = host::load_reference_marks(at("cameras.json"));
+    ASSERT_TRUE(kept.has_value()) << kept.error().message;
+    ASSERT_EQ(kept->size(), 2U);
+    for (std::size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ((*kept)[i].headset_mm, marks[i].headset_mm);
+        EXPECT_EQ((*kept)[i].cameras, marks[i].cameras);
+    }
+}
+
+TEST_F(CalibrateVerb, TheRigAsItWasIsReadOffAPackToo) {
+    const test::SamplePack sample({.cameras = 2, .reference_marks = 3});
+    ASSERT_TRUE(host::save_pack(at("face.pack"), sample.view, {}).has_value());
+    const auto reference = host::load_rig_reference(at("face.pack"));
+    ASSERT_TRUE(reference.has_value()) << reference.error().message;
+    ASSERT_EQ(reference->cameras.size(), 2U);
+    EXPECT_EQ(reference->cameras[1].centre_mm, sample.view.cameras[1].centre_mm);
+    ASSERT_EQ(reference->marks.size(), 3U);
+    for (std::size_t i = 0; i < 3; ++i) {
+        EXPECT_EQ(reference->marks[i].headset_mm, sample.view.reference_marks[i].headset_mm);
+        EXPECT_EQ(reference->marks[i].cameras, sample.view.reference_marks[i].cameras);
+    }
+    const test::SamplePack without({.cameras = 0});
+    ASSERT_TRUE(host::save_pack(at("blind.pack"), without.view, {}).has_value());
+    const auto none = host::load_rig_reference(at("blind.pack"));
+    ASSERT_FALSE(none.has_value());
+    EXPECT_TRUE(has(none.error().message, "without cameras")) << none.error().message;
+    EXPECT_FALSE(host::load_rig_reference(at("missing.json")).has_value());
+}
+
+// The eight moments as cameras would deliver them: each held for half a second.
+class LiveCalibrateVerb : public CalibrateVerb {
+  protected:
+    void play(const std::string& camera, std::size_t moments) {
+        fs::create_directories(folder.path() / ("live_" + camera));
+        for (std::size_t v = 0; v < moments; ++v) {
+            for (std::size_t i = 0; i < 5; ++i) {
+                fs::create_hard_link(
+                    shared->path() / camera / (std::to_string(v) + ".png"),
+                    folder.path() / ("live_" + camera) / (std::to_string(1000 + 5 * v + i) + ".png"));
+            }
+        }
+    }
+    [[nodiscard]] std::vector<std::string> live() const {
+        return {"--board", kBoard,
+                "--live",  "left=" + at("live_left") + ",right=" + at("live_right"),
+                "--out",   at("cameras.json")};
+    }
+};
+
+TEST_F(LiveCalibrateVerb, TakesShotsAndCalibratesAsFromTheirFiles) {
+    for (const char* camera : {"left", "right"}) play(camera, 8);
+    const test::VerbOutcome outcome = run(live());
+    ASSERT_EQ(outcome.exit_code, host::kExitOk) << outcome.err;
+    EXPECT_TRUE(has(outcome.out, "8 shots are kept in ")) << outcome.out;
+    EXPECT_TRUE(has(outcome.err, "shot 8: left 8/18 pictures")) << outcome.err;
+    const auto cameras = host::load_cameras(at("cameras.json"));
+    ASSERT_TRUE(cameras.has_value()) << cameras.error().message;
+    EXPECT_NEAR(((*cameras)[1].centre_mm - (*cameras)[0].centre_mm).norm(), 90.0, 0.05);
+
+    const test::VerbOutcome again = run(live());
+    EXPECT_EQ(again.exit_code, host::kExitUsage);
+    EXPECT_TRUE(has(again.err, "--continue")) << again.err;
+    const test::VerbOutcome from_files = run({"--board", kBoard, "--images", at("cameras_shots/left"),
+                                              at("cameras_shots/right"), "--out", at("again.json")});
+    ASSERT_EQ(from_files.exit_code, host::kExitOk) << from_files.err;
+    const auto repeated = host::load_cameras(at("again.json"));
+    ASSERT_TRUE(repeated.has_value());
+    for (std::size_t c = 0; c < 2; ++c) {
+        EXPECT_EQ((*repeated)[c].fx_px, (*cameras)[c].fx_px);
+        EXPECT_EQ((*repeated)[c].centre_mm, (*cameras)[c].centre_mm);
+    }
+}
+
+TEST_F(LiveCalibrateVerb, ACameraThatGoesAwayKeepsTheShotsAndContinueGoesOn) {
+    for (const char* camera : {"left", "right"}) play(camera, 6);
+    const fs::path broken = folder.path() / "live_right" / "1010.png";  // of the third moment
+    fs::remove(broken);
+    std::ofstream(broken) << "no picture";
+    const test::VerbOutcome outcome = run(live());
+    EXPECT_EQ(outcome.exit_code, host::kExitInput);
+    EXPECT_TRUE(has(outcome.err, "camera right went away") && has(outcome.err, "2 shots are kept") &&
+                has(outcome.err, "--continue"))
+        << outcome.err;
+    EXPECT_TRUE(fs::exists(at("cameras_shots/right/0002.png")));
+    EXPECT_FALSE(fs::exists(at("cameras.json")));
+    fs::remove(broken);
+    std::vector<std::string> all = live();
+    all.emplace_back("--continue");
+    const test::VerbOutcome more = run(all);
+    EXPECT_EQ(more.exit_code, host::kExitOk) << more.err;
+    EXPECT_TRUE(has(more.out, "2 shots in ") && has(more.out, "6 shots are kept")) << more.out;
+    EXPECT_FALSE(fs::exists(at("cameras_shots/right/0007.png")));
+}
+
+TEST_F(LiveCalibrateVerb, WhatIsNotThereOrNeverSeenIsSaidWithTheRemedy) {
+    const auto with = [&](const std::string& sources) {
+        return run({"--board", kBoard, "--live", sources, "--out", at("cameras.json")});
+    };
+    const test::VerbOutcome none = with("/dev/video99");
+    EXPECT_EQ(none.exit_code, host::kExitInput);
+    EXPECT_TRUE(has(none.err, "camera a: /dev/video99: there is no such device")) << none.err;
+    EXPECT_EQ(with("x=0,x=1").exit_code, host::kExitUsage);
+    EXPECT_EQ(with("a/b=0").exit_code, host::kExitInput);  // a path with a = in it, not a name
+    EXPECT_EQ(with("0,1,2,3,4").exit_code, host::kExitUsage);
+
+    play("left", 2);
+    fs::create_directories(folder.path() / "live_right");
+    const host::GreyImage dark{480, 640, std::vector<std::uint8_t>(480 * 640, 3)};
+    for (int i = 1000; i < 1010; ++i) {
+        const auto path = folder.path() / "live_right" / (std::to_string(i) + ".png");
+        ASSERT_TRUE(host::write_grey_image(path, dark.view()).has_value());
+    }
+    const test::VerbOutcome blind = run(live());
+    EXPECT_EQ(blind.exit_code, host::kExitInput);
+    EXPECT_TRUE(has(blind.err, "none of camera right: it never saw the board")) << blind.err;
 }
 
 TEST_F(CalibrateVerb, ASpoiledFileIsNamedAndTheRestIsUsed) {

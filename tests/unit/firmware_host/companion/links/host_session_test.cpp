@@ -87,6 +87,42 @@ TEST(HostSession, GreetsNamesAndStreams) {
     EXPECT_EQ(bench.raw, bench.session.frames().good);
 }
 
+TEST(HostSession, StatesHoldTheHeadOfTheirOwnTick) {
+    for (const std::uint32_t lose_every : {0U, 7U}) {
+        Bench bench({.lose_every = lose_every, .tells_head = true},
+                    {.streams = kStreamWeights | kStreamHead});
+        bench.run(4.0);
+        EXPECT_TRUE(bench.session.tells_head());
+        std::size_t known = 0;
+        std::size_t without = 0;
+        ASSERT_GT(bench.states.size(), 60U);
+        for (const FaceState& state : bench.states) {
+            if (state.head.status == HeadStatus::kUnknown) {
+                ++without;  // its head was lost on the line, and no other tick's stands in for it
+                EXPECT_EQ(state.head.capture_us, 0);
+                continue;
+            }
+            EXPECT_EQ(state.head.status, state.sequence % 4 == 3 ? HeadStatus::kTooFew : HeadStatus::kKnown);
+            EXPECT_EQ(state.head.capture_us, state.capture_us);
+            if (state.head.status != HeadStatus::kKnown) continue;
+            ++known;
+            EXPECT_EQ(state.head.translation_mm[0], static_cast<float>(state.sequence));
+        }
+        EXPECT_GT(known, bench.states.size() / 2);
+        EXPECT_EQ(without > 0, lose_every > 0);
+        EXPECT_EQ(bench.session.counters().unknown, 0U);
+    }
+}
+
+TEST(HostSession, ABoardThatKnowsNoHeadIsNotAskedForIt) {
+    Bench bench({}, {.streams = kStreamWeights | kStreamHead});
+    bench.run(1.0);
+    EXPECT_EQ(bench.session.phase(), SessionPhase::kReady) << bench.session.refusal();
+    EXPECT_FALSE(bench.session.tells_head());
+    ASSERT_FALSE(bench.states.empty());
+    EXPECT_EQ(bench.states.back().head.status, HeadStatus::kUnknown);
+}
+
 TEST(HostSession, MeasuresLatencyThroughTheOffsetOfTheClocks) {
     for (const std::int64_t ahead_us :
          {std::int64_t{0}, std::int64_t{3'600'000'000}, std::int64_t{-900'000}}) {

@@ -110,6 +110,21 @@ TEST(Screen, OneLineForPipes) {
               "sh\xC3\xA4pe_4=0.040");
 }
 
+TEST(Screen, TheHeadIsShownOfRigsThatTellIt) {
+    MonitorModel model = live_model(3);
+    EXPECT_EQ(monitor_line(model, 1.0).find("head pose"), std::string::npos);
+    model.hello->capabilities = kCanStreamHead;
+    EXPECT_NE(monitor_line(model, 1.0).find("head pose: no face"), std::string::npos)
+        << monitor_line(model, 1.0);
+    model.state->head.status = HeadStatus::kKnown;
+    model.state->head.rotation_rad = {0.0F, 0.5F, 0.0F};
+    model.state->head.translation_mm = {12.0F, -3.5F, 40.0F};
+    const std::string text = "head pose: turn 0.0 28.6 0.0 degrees  place 12.0 -3.5 40.0 mm";
+    EXPECT_NE(monitor_line(model, 1.0).find(text), std::string::npos) << monitor_line(model, 1.0);
+    const auto lines = monitor_screen(model, {100, 20}, false);
+    EXPECT_TRUE(std::ranges::any_of(lines, [&](const std::string& line) { return line.starts_with(text); }));
+}
+
 TEST(Screen, FittedCountsCharactersNotBytes) {
     EXPECT_EQ(fitted("\xC3\xA4"
                      "bc",
