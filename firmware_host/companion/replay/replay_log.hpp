@@ -27,6 +27,7 @@ struct ReplayResult {
     std::uint64_t ticks = 0;
     double rate_hz = 0.0;   // as recorded
     bool controls = false;  // the log sets some
+    bool camera_on_head = true;
     std::string cut;        // why the log ended early; empty when it is whole
 };
 
