@@ -28,7 +28,7 @@ struct ReplayResult {
     double rate_hz = 0.0;   // as recorded
     bool controls = false;  // the log sets some
     bool camera_on_head = true;
-    std::string cut;        // why the log ended early; empty when it is whole
+    std::string cut;  // why the log ended early; empty when it is whole
 };
 
 // One tick, right after its step().
