@@ -14,11 +14,12 @@ std::string motion_text(const CameraStatusLine& line) {
                        line.points);
 }
 
-// The tilts that are still lacking, one letter each: top, bottom, left, right away.
+// The tilts that are still lacking, one letter each: top, bottom, left, right of the board away.
 std::string tilts_text(const CoverageProgress& camera, const CoverageGoal& goal) {
     std::string text;
-    for (std::size_t t = 1; t < kTiltCount; ++t) text += camera.tilts[t] >= goal.each_tilt ? '*' : "?TBLR"[t];
-    return text;
+    for (std::size_t t = 1; t < kTiltCount; ++t)
+        if (camera.tilts[t] < goal.each_tilt) text += "?TBLR"[t];
+    return text.empty() ? "all tilts" : "lacks tilt " + text;
 }
 
 std::string next_text(const CaptureStatus& status, std::span<const std::string> names) {
@@ -34,13 +35,13 @@ std::string next_text(const CaptureStatus& status, std::span<const std::string> 
 std::vector<std::string> capture_lines(const CaptureStatus& status, std::span<const std::string> names) {
     const CoveragePlan& plan = *status.plan;
     std::vector<std::string> lines;
-    lines.push_back(fmt::format("{} shots, {:.0f} % of what is needed; Enter ends", plan.shots(),
+    lines.push_back(fmt::format("shots {}, {:.0f} % of what is needed; Enter ends", plan.shots(),
                                 100.0 * plan.progress()));
     for (std::size_t c = 0; c < names.size(); ++c) {
         const CoverageProgress& camera = plan.camera(c);
         lines.push_back(
-            fmt::format("camera {:<8} pictures {:>2}/{}  coverage {:>3.0f}/{:.0f} %  tilts {}{}  {}",
-                        names[c], camera.pictures, plan.goal().pictures, 100.0 * camera.share(),
+            fmt::format("camera {:<8} pictures {:>2}/{}  coverage {:>3.0f}/{:.0f} %  {:<15}{}  {}", names[c],
+                        camera.pictures, plan.goal().pictures, 100.0 * camera.share(),
                         100.0 * plan.goal().fields, tilts_text(camera, plan.goal()),
                         camera.linked ? "" : "  not linked", motion_text(status.cameras[c])));
     }

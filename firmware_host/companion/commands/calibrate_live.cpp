@@ -63,8 +63,9 @@ class CaptureScreen {
         if (is_interactive()) {
             std::string text = drawn_ == 0 ? std::string() : fmt::format("\x1b[{}A", drawn_);
             if (status.took) text += '\a';
+            const std::size_t columns = error_columns() - 1;  // a line that wraps would not be drawn over
             const std::vector<std::string> lines = capture_lines(status, names_);
-            for (const std::string& line : lines) text += "\r\x1b[K" + line.substr(0, 160) + "\n";
+            for (const std::string& line : lines) text += "\r\x1b[K" + line.substr(0, columns) + "\n";
             fmt::print(stderr, "{}", text);
             drawn_ = lines.size();
         } else if (status.took || status.moments - said_at_ >= kLineEvery) {

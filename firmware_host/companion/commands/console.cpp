@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -34,6 +35,11 @@ void on_interrupt(int) {
 
 bool is_interactive() {
     return isatty(STDERR_FILENO) == 1;
+}
+
+std::size_t error_columns() {
+    winsize window{};
+    return ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 0 ? window.ws_col : 80;
 }
 
 void print_error(std::string_view message) {

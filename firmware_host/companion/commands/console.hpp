@@ -12,6 +12,9 @@ namespace rig::host {
 // True when standard error is a terminal: colours and moving bars are for people only.
 [[nodiscard]] bool is_interactive();
 
+// Characters in a row of the terminal behind standard error; 80 when it does not say.
+[[nodiscard]] std::size_t error_columns();
+
 // "headrig: <message>" on standard error.
 void print_error(std::string_view message);
 

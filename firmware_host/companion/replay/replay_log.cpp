@@ -79,6 +79,7 @@ Result<ReplayResult, FileError> replay_log(const ReplayRequest& request, const O
     StreamDigest digest;
     ReplayResult result;
     result.rate_hz = config.rate_hz;
+    result.camera_on_head = config.camera_on_head;
     std::int64_t first_us = 0;
     while (!reader->at_end()) {
         const auto next = reader->next();

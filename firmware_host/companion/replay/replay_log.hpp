@@ -27,7 +27,8 @@ struct ReplayResult {
     std::uint64_t ticks = 0;
     double rate_hz = 0.0;   // as recorded
     bool controls = false;  // the log sets some
-    std::string cut;        // why the log ended early; empty when it is whole
+    bool camera_on_head = true;
+    std::string cut;  // why the log ended early; empty when it is whole
 };
 
 // One tick, right after its step().

@@ -29,10 +29,10 @@ class CaptureText : public testing::Test {
 TEST_F(CaptureText, SaysWhatEachCameraHasAndWhatComesNext) {
     const std::vector<std::string> lines = capture_lines(status, names);
     ASSERT_EQ(lines.size(), 4U);
-    EXPECT_TRUE(has(lines[0], "0 shots") && has(lines[0], "Enter ends")) << lines[0];
+    EXPECT_TRUE(has(lines[0], "shots 0,") && has(lines[0], "Enter ends")) << lines[0];
     EXPECT_TRUE(has(lines[1], "camera left") && has(lines[1], " 0/18") && has(lines[1], "moving, 40 points"))
         << lines[1];
-    EXPECT_TRUE(has(lines[1], "tilts TBLR")) << lines[1];
+    EXPECT_TRUE(has(lines[1], "lacks tilt TBLR")) << lines[1];
     EXPECT_TRUE(has(lines[2], "not linked") && has(lines[2], "no marker of dictionary")) << lines[2];
     EXPECT_TRUE(has(lines[3], "next: hold the board before camera ") && has(lines[3], "keep it still"))
         << lines[3];
