@@ -7,6 +7,7 @@
 
 #include "core/base/math.hpp"
 #include "core/detect/blob_shape.hpp"
+#include "core/detect/row_weights.hpp"
 #include "core/image/pixel_lanes.hpp"
 
 namespace rig {
@@ -91,20 +92,6 @@ class RimLanes {
     PixelLanes x_;
     PixelLanes level_;
     PixelLanes n_{}, ny_{}, nyy_{}, t_{}, ty_{}, tt_{};
-};
-
-// Weights of eight columns, summed over rows: once, weighted with the rows left, and with half their squares.
-struct WeightLanes {
-    PixelLanes sum{};
-    FourInts low{}, high{};
-    FourInts low_twice{}, high_twice{};
-
-    void add(PixelLanes weight) {
-        sum += weight;
-        const auto [a, b] = ints_of_lanes(sum);
-        low += a, high += b;
-        low_twice += low, high_twice += high;
-    }
 };
 
 // A grey level for every pixel, linear in x and y; in fixed point, each column rounded by itself.

@@ -34,6 +34,34 @@ TEST(PixelLanes, BitsBecomeMasksAndComeBack) {
     }
 }
 
+TEST(PixelLanes, SixteenBitsBecomeBytesAndComeBack) {
+    for (std::uint32_t bits = 0; bits < 65536; bits += 37) {
+        const SixteenBytes mask = bytes_of_bits(bits | 0xABC0000U);  // only the lowest sixteen count
+        std::uint32_t count = 0;
+        for (int i = 0; i < kByteLanes; ++i) {
+            EXPECT_EQ(mask[i], (bits >> i & 1U) != 0 ? 255 : 0);
+            count += bits >> i & 1U;
+        }
+        EXPECT_EQ(bits_of_bytes(mask), bits);
+        EXPECT_EQ(sum_of_bytes(mask), 255U * count);
+        const SixteenBytes packed = bytes_of_masks(lanes_of_bits(bits), lanes_of_bits(bits >> 8));
+        EXPECT_EQ(bits_of_bytes(packed), bits);
+    }
+}
+
+TEST(PixelLanes, TheGreaterAndTheLessAreTheSecondWhenEqual) {
+    const FourFloats a{1.0F, -2.0F, 3.0F, 0.0F};
+    const FourFloats b{2.0F, -3.0F, 3.0F, -0.0F};
+    const FourFloats greater = greater_of(a, b);
+    const FourFloats less = less_of(a, b);
+    for (int i = 0; i < 4; ++i) {
+        EXPECT_EQ(greater[i], a[i] > b[i] ? a[i] : b[i]);
+        EXPECT_EQ(less[i], a[i] < b[i] ? a[i] : b[i]);
+    }
+    EXPECT_TRUE(std::signbit(greater[3]));
+    EXPECT_TRUE(std::signbit(less[3]));
+}
+
 TEST(PixelLanes, NumbersAreKeptOnTheWayToIntsAndFloats) {
     test::SeededRandom random(3);
     for (int round = 0; round < 100; ++round) {
