@@ -159,8 +159,8 @@ class Detector {
         std::array<std::uint8_t, kMaxBlocks> background{};
         std::array<std::uint8_t, kSlideBytes> slide{};
         std::array<Run, kMaxRuns> runs{};
-        std::array<std::uint32_t, kMaxRuns> parents{};
-        std::array<std::uint32_t, kMaxRuns> areas{};
+        std::array<ComponentLabel, kMaxRuns> labels{};
+        std::array<std::uint16_t, kMaxRuns> label_of{};
         std::array<Run, kMaxRuns> grouped{};
         std::array<Component, kMaxBlobs> components{};
         std::array<SplitStorage, kSplitLevels> split{};

@@ -60,6 +60,10 @@ void sliding_min(const BlockGrid& grid, int radius, std::span<std::uint8_t> scra
 
 enum class Side : std::uint8_t { kBelow, kAbove };
 
+// Every level L moves away from the background, down for what is below it and up for what is above: by
+// max(least, L part / 256), down to 0 or up to 250. 0 <= least <= 255, 0 <= part <= 256.
+void step_levels(const BlockGrid& grid, Side side, int least, int part);
+
 // Runs of pixels strictly below (above) the threshold of their block, in raster order. Returns how many were
 // written; stops at the end of a row that might not fit and then sets `truncated`.
 [[nodiscard]] std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, Side side,

@@ -124,6 +124,29 @@ inline void store_bytes(SixteenBytes bytes, std::uint8_t* to) {
 #endif
 }
 
+// Numbers of 0 to 255 as bytes: those of `low`, then those of `high`.
+[[nodiscard]] inline SixteenBytes bytes_of_lanes(PixelLanes low, PixelLanes high) {
+#if defined(__SSE2__)
+    return reinterpret_cast<SixteenBytes>(__builtin_ia32_packuswb128(low, high));
+#else
+    const auto a = reinterpret_cast<SixteenBytes>(low);
+    const auto b = reinterpret_cast<SixteenBytes>(high);
+    return __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+#endif
+}
+
+// Each of four bytes four times.
+[[nodiscard]] inline SixteenBytes load_four_times_each(const std::uint8_t* from) {
+    std::uint32_t word = 0;
+    std::memcpy(&word, from, sizeof(word));
+    using Words = std::uint32_t __attribute__((vector_size(16)));
+    const auto four = reinterpret_cast<SixteenBytes>(Words{word, 0, 0, 0});
+    const SixteenBytes twice =
+        __builtin_shufflevector(four, four, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7);
+    const auto pairs = reinterpret_cast<EightSums>(twice);
+    return reinterpret_cast<SixteenBytes>(__builtin_shufflevector(pairs, pairs, 0, 0, 1, 1, 2, 2, 3, 3));
+}
+
 // One bit for each lane of -1, none for those of 0.
 [[nodiscard]] inline std::uint64_t bits_of_lanes(PixelLanes mask) {
     return bits_of_bytes(bytes_of_masks(mask, PixelLanes{}));

@@ -98,6 +98,26 @@ TEST(Kernels, SlidingExtremesEqualThePlainSearch) {
     }
 }
 
+TEST(Kernels, LevelsMoveAwayFromTheBackgroundByTheGreaterStep) {
+    SeededRandom random(12);
+    for (const int blocks : {1, 7, 16, 300}) {
+        for (const Side side : {Side::kBelow, Side::kAbove}) {
+            std::vector<std::uint8_t> levels(static_cast<std::size_t>(blocks));
+            for (std::uint8_t& level : levels) level = static_cast<std::uint8_t>(random.bits());
+            const std::vector<std::uint8_t> before = levels;
+            const int least = static_cast<int>(random.below(256));
+            const int part = static_cast<int>(random.below(257));
+            step_levels({levels, blocks, 1}, side, least, part);
+            for (std::size_t i = 0; i < levels.size(); ++i) {
+                const int step = std::max(least, before[i] * part >> 8);
+                const int expected =
+                    side == Side::kBelow ? std::max(0, before[i] - step) : std::min(250, before[i] + step);
+                ASSERT_EQ(levels[i], expected);
+            }
+        }
+    }
+}
+
 TEST(Kernels, RunsAreExactlyThePixelsBeyondTheThreshold) {
     SeededRandom random(3);
     for (const Size size : kSizes) {

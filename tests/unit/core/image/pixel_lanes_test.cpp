@@ -49,6 +49,20 @@ TEST(PixelLanes, SixteenBitsBecomeBytesAndComeBack) {
     }
 }
 
+TEST(PixelLanes, BytesComeFromLanesAndFromEveryBlock) {
+    test::SeededRandom random(6);
+    for (int round = 0; round < 100; ++round) {
+        std::array<std::uint8_t, 16> bytes;
+        for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random.below(256));
+        const SixteenBytes back = bytes_of_lanes(load_pixels(bytes.data(), 0), load_pixels(&bytes[8], 0));
+        const SixteenBytes spread = load_four_times_each(bytes.data());
+        for (int i = 0; i < kByteLanes; ++i) {
+            EXPECT_EQ(back[i], bytes[static_cast<std::size_t>(i)]);
+            EXPECT_EQ(spread[i], bytes[static_cast<std::size_t>(i / 4)]);
+        }
+    }
+}
+
 TEST(PixelLanes, TheGreaterAndTheLessAreTheSecondWhenEqual) {
     const FourFloats a{1.0F, -2.0F, 3.0F, 0.0F};
     const FourFloats b{2.0F, -3.0F, 3.0F, -0.0F};
