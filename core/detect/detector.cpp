@@ -228,9 +228,10 @@ bool Detector::has_core(const Search& search, std::span<const Run> runs) const {
                 known = level;
             }
             const int end = std::min<int>(run.end, x + kBlock - (x - search.left) % kBlock);
-            for (; x < end; ++x) deep += sign * (level - pixels[x]) >= most ? 1 : 0;
+            for (; x < end; ++x) {
+                if (sign * (level - pixels[x]) >= most && ++deep == kCorePixels) return true;
+            }
         }
-        if (deep >= kCorePixels) return true;
     }
     return false;
 }

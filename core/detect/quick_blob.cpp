@@ -464,19 +464,17 @@ double QuickMeasure::deviation_px(const SoftMoments& m, double radius_px) const 
 // Of the moat, from one to three steps outside the blob, the part that is no background.
 double QuickMeasure::open_part(double contrast) const {
     if (clean_ >= kCleanRim) return 0.0;
-    BitRows& moat = w_.scratch;
-    std::fill_n(moat.begin(), s_.height, std::uint64_t{0});
-    std::copy(w_.blob.begin() + first_, w_.blob.begin() + last_ + 1, moat.begin() + first_);
-    grow_square(moat, s_.height);
-    const BitRows inner = moat;
-    grow_cross(moat, s_.height);
-    grow_square(moat, s_.height);
+    BitRows& moat = w_.moat;
+    BitRows& set = w_.set;
+    std::fill_n(set.begin(), s_.height, std::uint64_t{0});
+    std::copy(w_.blob.begin() + first_, w_.blob.begin() + last_ + 1, set.begin() + first_);
+    draw_moat(set, s_.width, s_.height, moat);
     const Slope level = level_at(kOpenCover, kFine, contrast);
     int total = 0;
     int open = 0;
     for (int y = 0; y < s_.height; ++y) {
         const auto at = static_cast<std::size_t>(y);
-        const std::uint64_t look = moat[at] & ~inner[at] & row_mask(s_.width);
+        const std::uint64_t look = moat[at];
         if (look == 0) continue;
         total += ones(look);
         const std::uint64_t dusky = marked(level, y, look);

@@ -82,22 +82,23 @@ PlaneLanes sum_columns(const BlobWorkspace& w, const BitRows& marked, const BitB
     const auto most =
         reinterpret_cast<FourInts>(FourWords{} + (static_cast<std::uint32_t>(band.reach) - kTop));
     PlaneLanes lanes;
+    PixelLanes at = all_lanes(box.top - 1 - centre_y);
     for (int py = box.top; py < box.bottom; ++py) {
+        at += 1;
         const std::uint64_t bits = marked[static_cast<std::size_t>(py)] >> left & 0xFFU;
         if (bits == 0) continue;
-        const int y = py - centre_y;
-        const std::uint32_t row =
-            static_cast<std::uint32_t>(band.lowest) + static_cast<std::uint32_t>(band.slope_y * y) + kTop;
+        const std::uint32_t row = static_cast<std::uint32_t>(band.lowest) +
+                                  static_cast<std::uint32_t>(band.slope_y * (py - centre_y)) + kTop;
         const PixelLanes v = load_pixels(w.values[static_cast<std::size_t>(py)].data() + left, 0);
         const EightWords level = times_fraction(v);
         const EightInts over{reinterpret_cast<FourInts>(level.low - (low + row)) > most,
                              reinterpret_cast<FourInts>(level.high - (high + row)) > most};
         const PixelLanes keep = lanes_of_bits(bits) & ~lanes_of_ints(over);
         const PixelLanes kept = v & keep;
-        const PixelLanes at = all_lanes(y);
+        const PixelLanes kept_at = at & keep;
         lanes.n -= keep;
-        lanes.y += keep & at;
-        lanes.yy += keep & all_lanes(y * y);
+        lanes.y += kept_at;
+        lanes.yy += kept_at * at;
         lanes.v += kept;
         lanes.yv += products_of_pairs(kept, at);
         lanes.vv += products_of_pairs(kept, kept);
