@@ -22,7 +22,12 @@ class GuardedRows {
                     std::uint64_t{0});
     }
     GuardedRows(const BitRows& rows, int height) : GuardedRows(height) {
-        std::memcpy(&rows_[kGuard], rows.data(), height_ * sizeof(std::uint64_t));
+        for (int y = 0; y < height; y += 2) {
+            TwoRows two;
+            std::memcpy(&two, &rows[static_cast<std::size_t>(y)], sizeof(two));
+            set(y, two);
+        }
+        clear_after_last();
     }
     // Rows y and y + 1; from kGuard before the first to kGuard after the last.
     [[nodiscard]] TwoRows at(int y) const {
@@ -65,17 +70,13 @@ void store_rows(TwoRows two, int y, BitRows& rows) {
 
 }  // namespace
 
-int count_bits(const BitRows& rows, int height) {
+int count_bits(const BitRows& rows, int top, int bottom) {
     int count = 0;
-    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
-        if (rows[y] != 0) count += ones(rows[y]);
-    }
+    for (int y = top; y < bottom; ++y) count += ones(rows[static_cast<std::size_t>(y)]);
     return count;
 }
 
-BitBox box_of(const BitRows& rows, int height) {
-    int top = 0;
-    int bottom = height;
+BitBox box_of(const BitRows& rows, int top, int bottom) {
     while (top < bottom && rows[static_cast<std::size_t>(top)] == 0) ++top;
     while (top < bottom && rows[static_cast<std::size_t>(bottom - 1)] == 0) --bottom;
     if (top == bottom) return {};
@@ -251,7 +252,7 @@ void fill_holes(BitRows& rows, int width, int height) {
     if (split == 0) return;
     // Left and right of its bits a row is free, as are rows on the rim; what lies between them is free when
     // it hangs together with that.
-    const BitBox box = box_of(rows, height);
+    const BitBox box = box_of(rows, 0, height);
     BitRows gaps;
     for (int y = box.top; y < box.bottom; ++y) {
         const std::uint64_t row = rows[static_cast<std::size_t>(y)];

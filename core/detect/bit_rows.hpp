@@ -37,7 +37,12 @@ using BitRows = std::array<std::uint64_t, kBlobWindowPx>;
     return row & (row + (row & (~row + 1)));
 }
 
-[[nodiscard]] int count_bits(const BitRows& rows, int height);
+[[nodiscard]] int count_bits(const BitRows& rows, int top, int bottom);
+
+// The first `height` rows; without a library's call for so few bytes.
+inline void copy_rows(const BitRows& from, int height, BitRows& to) {
+    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) to[y] = from[y];
+}
 
 // Rows [top, bottom), columns [left, right).
 struct BitBox {
@@ -47,8 +52,8 @@ struct BitBox {
     int bottom = 0;
 };
 
-// The least box around the bits; all zero without any.
-[[nodiscard]] BitBox box_of(const BitRows& rows, int height);
+// The least box around the bits from row `top` to `bottom` (exclusive); all zero without any.
+[[nodiscard]] BitBox box_of(const BitRows& rows, int top, int bottom);
 
 // By so many pixels on every side, as far as the window goes.
 [[nodiscard]] BitBox widened(const BitBox& box, int by, int width, int height);

@@ -63,7 +63,8 @@ void load_window(const ImageView& image, Side side, const Component& component, 
     for (const Run& run : runs) {
         w.blob[static_cast<std::size_t>(run.y - w.top)] |= bit_span(run.begin - w.left, run.end - w.left);
     }
-    w.box = box_of(w.blob, w.height);
+    w.box = {component.left - w.left, component.top - w.top, component.right + 1 - w.left,
+             component.bottom + 1 - w.top};
 }
 
 // The blob and its siblings grow towards each other; what the siblings reach first is theirs.
@@ -202,7 +203,7 @@ void compute_cover(BlobWorkspace& w, Side side, const Plane& plane, double depth
 // cover is known so far around the blob that was found, and no farther.
 void mark_covered(const BlobWorkspace& w, int outline, BitRows& covered) {
     const BitBox box = widened(w.box, kRedrawReach, w.width, w.height);
-    std::copy_n(w.blob.begin(), w.height, covered.begin());
+    copy_rows(w.blob, w.height, covered);
     if (outline == kHalf) grow_octagon(covered, w.height);
     for (int y = box.top; y < box.bottom; ++y) {
         const auto row = static_cast<std::size_t>(y);
@@ -237,7 +238,7 @@ int largest_piece(BitRows& rest, int height, const BitBox& box, BitRows& best) {
             std::swap(seed, largest);
         }
     }
-    std::copy_n(largest->begin(), height, best.begin());
+    copy_rows(*largest, height, best);
     return best_count;
 }
 
@@ -246,22 +247,23 @@ int largest_piece(BitRows& rest, int height, const BitBox& box, BitRows& best) {
 bool redraw_blob(BlobWorkspace& w, int outline, Rejection& reason) {
     BitRows& covered = w.scratch;
     mark_covered(w, outline, covered);
-    const BitBox box = box_of(covered, w.height);
+    const BitBox near = widened(w.box, kRedrawReach, w.width, w.height);
+    const BitBox box = box_of(covered, near.top, near.bottom);
     reason = Rejection::kSmall;
     if (box.top == box.bottom) return false;
     if (is_one_stack(covered, box.top, box.bottom)) {
-        std::copy_n(covered.begin(), w.height, w.blob.begin());
+        copy_rows(covered, w.height, w.blob);
         w.box = box;
         return true;
     }
-    const int total = count_bits(covered, w.height);
+    const int total = count_bits(covered, box.top, box.bottom);
     BitRows best;
     const int count = largest_piece(covered, w.height, box, best);
     reason = Rejection::kSeveral;
     if ((total - count) * 5 > total) return false;
-    std::copy_n(best.begin(), w.height, w.blob.begin());
+    copy_rows(best, w.height, w.blob);
     fill_holes(w.blob, w.width, w.height);
-    w.box = box_of(w.blob, w.height);
+    w.box = box_of(w.blob, box.top, box.bottom);
     return true;
 }
 
@@ -283,7 +285,7 @@ void draw_interior(const BlobWorkspace& w, BitRows& inner) {
 // whatever it looks like: glints that are dimmer than skin.
 SoftMoments soft_moments(BlobWorkspace& w, int outline) {
     BitRows& region = w.scratch;
-    std::copy_n(w.blob.begin(), w.height, region.begin());
+    copy_rows(w.blob, w.height, region);
     grow_square(region, w.height);
     for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y)
         region[y] &= ~w.foreign[y] & ~w.hidden[y];
@@ -354,7 +356,7 @@ bool touches_border(const ImageView& image, const BlobWorkspace& w) {
 // Outline -> background -> outline, twice unless the first outline was already right.
 Rejection outline_at_mid_contrast(Side side, const Component& component, const BlobLimits& limits,
                                   BlobWorkspace& w, PlaneFit& fit, Blob& blob) {
-    int pixels = count_bits(w.blob, w.height);
+    int pixels = static_cast<int>(component.area_px);
     for (int round = 0; round < kRounds; ++round) {
         draw_ring(w);
         const int core = percentile(w, w.blob, w.box, kCorePercent);
@@ -370,7 +372,7 @@ Rejection outline_at_mid_contrast(Side side, const Component& component, const B
         Rejection reason = Rejection::kNone;
         if (!redraw_blob(w, kHalf, reason)) return reason;
         const int before = pixels;
-        pixels = count_bits(w.blob, w.height);
+        pixels = count_bits(w.blob, w.box.top, w.box.bottom);
         if (std::abs(pixels - before) * 4 <= before) break;
     }
     return Rejection::kNone;

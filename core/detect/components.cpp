@@ -28,37 +28,33 @@ std::uint16_t unite(ComponentLabel* labels, std::uint16_t a, std::uint16_t b) {
 
 // Most runs touch one run of the row above and take its label; only a second one makes a union. Returns the
 // number of labels.
-std::uint32_t unite_rows(const Run* runs, std::uint32_t total, ComponentLabel* labels,
-                         std::uint16_t* label_of) {
+std::uint32_t unite_rows(const Run* __restrict runs, std::uint32_t total, ComponentLabel* __restrict labels,
+                         std::uint16_t* __restrict label_of) {
     std::uint32_t count = 0;
     std::uint32_t above = 0;  // runs of the row above that can still touch: from here
-    std::uint32_t above_end = 0;
-    std::uint32_t i = 0;
-    while (i < total) {
-        const std::uint32_t row = i;
-        const std::uint16_t y = runs[i].y;
-        if (above < above_end && runs[above].y + 1 != y) above = above_end;
-        for (; i < total && runs[i].y == y; ++i) {
-            const std::uint16_t begin = runs[i].begin;
-            const std::uint16_t end = runs[i].end;
-            while (above < above_end && runs[above].end < begin) ++above;  // equal touches diagonally
-            std::uint16_t root = 0;
-            if (above < above_end && runs[above].begin <= end) {
-                root = root_of(labels, label_of[above]);
-                for (std::uint32_t k = above + 1; k < above_end && runs[k].begin <= end; ++k) {
-                    const std::uint16_t other = root_of(labels, label_of[k]);
-                    if (other != root) root = unite(labels, root, other);
-                }
-            } else {
-                root = static_cast<std::uint16_t>(count);
-                labels[count++] = {0, root, 0};
-            }
-            labels[root].area_px += static_cast<std::uint32_t>(end - begin);
-            ++labels[root].count;
-            label_of[i] = root;
+    std::uint32_t row = 0;    // to here, where the row of the run begins
+    int y = -2;
+    for (std::uint32_t i = 0; i < total; ++i) {
+        const Run run = runs[i];
+        if (run.y != y) {
+            above = y + 1 == run.y ? row : i;
+            row = i;
+            y = run.y;
         }
-        above = row;
-        above_end = i;
+        while (above < row && runs[above].end < run.begin) ++above;  // equal touches diagonally
+        std::uint16_t root = static_cast<std::uint16_t>(count);
+        if (above < row && runs[above].begin <= run.end) {
+            root = root_of(labels, label_of[above]);
+            for (std::uint32_t k = above + 1; k < row && runs[k].begin <= run.end; ++k) {
+                const std::uint16_t other = root_of(labels, label_of[k]);
+                if (other != root) root = unite(labels, root, other);
+            }
+        } else {
+            labels[count++] = {0, root, 0};
+        }
+        labels[root].area_px += static_cast<std::uint32_t>(run.end - run.begin);
+        ++labels[root].count;
+        label_of[i] = root;
     }
     return count;
 }
@@ -99,13 +95,16 @@ ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits
                                           : labels[label.parent].area_px;
     }
 
+    Run* const grouped = storage.grouped.data();
+    Component* const components = storage.components.data();
     for (std::size_t i = 0; i < total; ++i) {
         const std::uint32_t number = labels[label_of[i]].area_px;
         if (number == kNone) continue;
-        Component& component = storage.components[number];
-        if (component.count == 0) component.top = runs[i].y;
-        storage.grouped[component.first + component.count] = runs[i];
-        widen(component, runs[i]);
+        const Run run = runs[i];
+        Component& component = components[number];
+        if (component.count == 0) component.top = run.y;
+        grouped[component.first + component.count] = run;
+        widen(component, run);
     }
     return counts;
 }

@@ -463,8 +463,8 @@ void Detector::detect(const ImageView& image, Observations& observations, Detect
         return;
     }
     report.whole_image = true;
-    measure_exposure(image, report);
     const BlockGrid means = block_means(image, workspace_.means);
+    measure_exposure(image, report);  // whose rows are now at hand
     finish(look(image, means, report), observations, report);
 }
 

@@ -74,11 +74,11 @@ bool mark_hidden(const BlobWorkspace& w, double noise_cover, BitRows& hidden) {
     const double limit = -kFull * std::max(kHiddenCover, kLeastNoise * noise_cover);
     const auto least = static_cast<int>(std::max(limit, -2.0 * kFull));  // no cover is that low
     BitRows near;
-    std::copy_n(w.blob.begin(), w.height, near.begin());
+    copy_rows(w.blob, w.height, near);
     grow_octagon(near, w.height);
     std::fill_n(hidden.begin(), w.height, std::uint64_t{0});
     const std::uint64_t mask = row_mask(w.width);
-    const BitBox box = widened(box_of(w.blob, w.height), kNearReach, w.width, w.height);
+    const BitBox box = widened(w.box, kNearReach, w.width, w.height);
     std::uint64_t any = 0;
     for (int y = box.top; y < box.bottom; ++y) {
         const auto row = static_cast<std::size_t>(y);

@@ -126,8 +126,8 @@ constexpr std::size_t kWordPx = 64;
 constexpr std::size_t kMaxWords = kMaxImageWidth / kWordPx;
 static_assert(kMaxImageWidth % kWordPx == 0);
 
-// The rows of a row of blocks, 64 pixels a word.
-using RowWords = std::array<std::array<std::uint64_t, kMaxWords>, kBlock>;
+// A row of pixels, 64 a word.
+using RowWords = std::array<std::uint64_t, kMaxWords>;
 
 // One row of blocks: its levels, and its rows of pixels, as many as there are.
 struct BlockRow {
@@ -138,7 +138,7 @@ struct BlockRow {
 
 // One word from pixel `first` on, of kRows at once, so that their levels are spread once.
 template <Side kSide, std::size_t kRows>
-void mark_word(const BlockRow& of, std::size_t first, RowWords& words) {
+void mark_word(const BlockRow& of, std::size_t first, RowWords* words) {
     std::uint64_t bits[kRows]{};
     for (std::size_t x = 0; x < kWordPx; x += kLanes) {
         const SixteenBytes levels = load_four_times_each(of.levels + (first + x) / kBlockPx);
@@ -150,7 +150,7 @@ void mark_word(const BlockRow& of, std::size_t first, RowWords& words) {
 
 // The last word, where it is not whole: `pixels` of it.
 template <Side kSide, std::size_t kRows>
-void mark_rest(const BlockRow& of, std::size_t first, std::size_t pixels, RowWords& words) {
+void mark_rest(const BlockRow& of, std::size_t first, std::size_t pixels, RowWords* words) {
     std::array<std::uint8_t, kWordPx / kBlockPx> levels{};
     std::memcpy(levels.data(), of.levels + first / kBlockPx, (pixels + kBlockPx - 1) / kBlockPx);
     for (std::size_t r = 0; r < kRows; ++r) {
@@ -166,14 +166,14 @@ void mark_rest(const BlockRow& of, std::size_t first, std::size_t pixels, RowWor
 }
 
 template <Side kSide, std::size_t kRows>
-void mark_beyond(const BlockRow& of, std::size_t width, RowWords& words) {
+void mark_beyond(const BlockRow& of, std::size_t width, RowWords* words) {
     std::size_t first = 0;
     for (; first + kWordPx <= width; first += kWordPx) mark_word<kSide, kRows>(of, first, words);
     if (first < width) mark_rest<kSide, kRows>(of, first, width - first, words);
 }
 
 template <Side kSide>
-void mark_beyond(const BlockRow& of, std::size_t width, RowWords& words) {
+void mark_beyond(const BlockRow& of, std::size_t width, RowWords* words) {
     switch (of.rows) {
         case 1:
             return mark_beyond<kSide, 1>(of, width, words);
@@ -187,7 +187,7 @@ void mark_beyond(const BlockRow& of, std::size_t width, RowWords& words) {
 }
 
 void mark_beyond(const ImageView& image, const BlockGrid& thresholds, Side side, int block_y,
-                 RowWords& words) {
+                 RowWords* words) {
     BlockRow row;
     row.levels =
         &thresholds.values[static_cast<std::size_t>(block_y) * static_cast<std::size_t>(thresholds.width)];
@@ -202,18 +202,30 @@ void mark_beyond(const ImageView& image, const BlockGrid& thresholds, Side side,
     }
 }
 
-// Runs of a row of words: where a bit differs from the one before it, one begins or ends.
-std::size_t runs_of_row(const std::uint64_t* words, std::size_t width, int y, Run* runs) {
+// The pixels of word k that have one of their eight neighbours marked.
+std::uint64_t with_neighbour(const RowWords* row, std::size_t k, std::size_t count) {
+    const auto column = [row](std::size_t at) { return row[-1][at] | row[0][at] | row[1][at]; };
+    const std::uint64_t here = column(k);
+    const std::uint64_t left = k > 0 ? column(k - 1) >> (kWordPx - 1) : 0;
+    const std::uint64_t right = k + 1 < count ? column(k + 1) << (kWordPx - 1) : 0;
+    return row[0][k] & (row[-1][k] | row[1][k] | here << 1 | here >> 1 | left | right);
+}
+
+// Runs of a row that stands between its neighbours: where a bit differs from the one before it, one begins or
+// ends.
+std::size_t runs_of_row(const RowWords* row, std::size_t width, int y, Run* runs) {
     std::array<std::uint16_t, kMaxImageWidth + 2> turns;
     std::size_t count = 0;
     std::uint64_t before = 0;
-    for (std::size_t first = 0; first < width; first += kWordPx) {
-        const std::uint64_t word = words[first / kWordPx];
+    const std::size_t words = (width + kWordPx - 1) / kWordPx;
+    for (std::size_t k = 0; k < words; ++k) {
+        if ((row[0][k] | before) == 0) continue;
+        const std::uint64_t word = with_neighbour(row, k, words);
         std::uint64_t changes = word ^ (word << 1 | before);
         before = word >> (kWordPx - 1);
         for (; changes != 0; changes &= changes - 1) {
             turns[count++] =
-                static_cast<std::uint16_t>(first + static_cast<std::size_t>(std::countr_zero(changes)));
+                static_cast<std::uint16_t>(k * kWordPx + static_cast<std::size_t>(std::countr_zero(changes)));
         }
     }
     if (count % 2 != 0) turns[count++] = static_cast<std::uint16_t>(width);
@@ -311,15 +323,26 @@ std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, 
               thresholds.height == blocks_across(image.height_px));
     truncated = false;
     const auto width = static_cast<std::size_t>(image.width_px);
-    RowWords words;
+    const auto words = (width + kWordPx - 1) / kWordPx;
+    // The last two rows of the blocks before, the rows of these: all but the last have both neighbours.
+    std::array<RowWords, kBlock + 2> rows;
+    for (RowWords& row : rows) std::fill_n(row.begin(), words, std::uint64_t{0});
     std::size_t count = 0;
-    for (int y = 0; y < image.height_px; ++y) {
-        if (y % kBlock == 0) mark_beyond(image, thresholds, side, y / kBlock, words);
-        if (runs.size() - count < width / 2 + 1) {  // the most runs a row can have
-            truncated = true;
-            break;
+    for (int top = 0; top <= image.height_px; top += kBlock) {
+        if (top < image.height_px) mark_beyond(image, thresholds, side, top / kBlock, &rows[2]);
+        for (int r = std::max(0, image.height_px - top); r < kBlock; ++r)
+            std::fill_n(rows[static_cast<std::size_t>(r) + 2].begin(), words, std::uint64_t{0});
+        for (int r = 0; r < kBlock; ++r) {
+            const int y = top + r - 1;
+            if (y < 0 || y >= image.height_px) continue;
+            if (runs.size() - count < width / 2 + 1) {  // the most runs a row can have
+                truncated = true;
+                return count;
+            }
+            count += runs_of_row(&rows[static_cast<std::size_t>(r) + 1], width, y, &runs[count]);
         }
-        count += runs_of_row(words[static_cast<std::size_t>(y % kBlock)].data(), width, y, &runs[count]);
+        std::copy_n(rows[kBlock].begin(), words, rows[0].begin());
+        std::copy_n(rows[kBlock + 1].begin(), words, rows[1].begin());
     }
     return count;
 }
@@ -330,9 +353,9 @@ void threshold_bits(const ImageView& image, const BlockGrid& thresholds, Side si
     RIG_CHECK(thresholds.width == blocks_across(image.width_px) &&
               thresholds.height == blocks_across(image.height_px));
     RIG_CHECK(rows.size() >= static_cast<std::size_t>(image.height_px));
-    RowWords words;
+    std::array<RowWords, kBlock> words;
     for (int y = 0; y < image.height_px; ++y) {
-        if (y % kBlock == 0) mark_beyond(image, thresholds, side, y / kBlock, words);
+        if (y % kBlock == 0) mark_beyond(image, thresholds, side, y / kBlock, words.data());
         rows[static_cast<std::size_t>(y)] = words[static_cast<std::size_t>(y % kBlock)][0];
     }
 }

@@ -132,11 +132,11 @@ TEST(BitRows, AStackIsConnectedWithoutHoles) {
 
 TEST(BitRows, TheBoxHoldsAllBitsAndNoMore) {
     BitRows rows{};
-    const BitBox none = box_of(rows, 64);
+    const BitBox none = box_of(rows, 0, 64);
     EXPECT_EQ(none.top, none.bottom);
     rows[5] = 0b0110U;
     rows[9] = std::uint64_t{1} << 63;
-    const BitBox box = box_of(rows, 64);
+    const BitBox box = box_of(rows, 0, 64);
     EXPECT_EQ(box.left, 1);
     EXPECT_EQ(box.top, 5);
     EXPECT_EQ(box.right, 64);

@@ -71,7 +71,7 @@ TEST(WindowSums, PercentileIsTheValueOfThatRank) {
             }
         }
         std::sort(values.begin(), values.end());
-        const BitBox box = box_of(marked, w->height);
+        const BitBox box = box_of(marked, 0, w->height);
         for (const int percent : {0, 30, 50, 99}) {
             const std::size_t rank = values.size() * static_cast<std::size_t>(percent) / 100;
             EXPECT_EQ(percentile(*w, marked, box, percent), values.empty() ? 0 : values[rank]);
@@ -103,7 +103,7 @@ TEST(WindowSums, ABandKeepsExactlyItsPixels) {
                 plain.xv += x * v, plain.yv += y * v, plain.vv += v * v;
             }
         }
-        const PlaneSums sums = sum_in_band(*w, marked, box_of(marked, w->height), band, cx, cy);
+        const PlaneSums sums = sum_in_band(*w, marked, box_of(marked, 0, w->height), band, cx, cy);
         EXPECT_EQ(sums.n, plain.n);
         EXPECT_EQ(sums.x, plain.x);
         EXPECT_EQ(sums.y, plain.y);
@@ -127,7 +127,7 @@ TEST(WindowSums, WeightsRiseWithTheCoverAndAreWholeInside) {
         BitRows rim = random_bits(random, *w, 0.5);
         BitRows inner = random_bits(random, *w, 0.5);
         for (std::size_t y = 0; y < rim.size(); ++y) rim[y] &= region[y], inner[y] &= rim[y];
-        const BitBox box = box_of(region, w->height);
+        const BitBox box = box_of(region, 0, w->height);
         WeightSums plain;
         for (int py = box.top; py < box.bottom; ++py) {
             for (int px = box.left; px < box.right; ++px) {
