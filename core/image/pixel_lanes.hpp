@@ -46,12 +46,6 @@ inline void store_bytes(SixteenBytes bytes, std::uint8_t* to) {
     std::memcpy(to, &bytes, sizeof(bytes));
 }
 
-// Sums of neighbours: byte 2i + byte 2i + 1 in lane i.
-[[nodiscard]] inline EightSums sums_of_pairs(SixteenBytes bytes) {
-    const auto pairs = reinterpret_cast<EightSums>(bytes);
-    return (pairs & 0xFF) + (pairs >> 8);
-}
-
 // Of all sixteen.
 [[nodiscard]] inline std::uint32_t sum_of_bytes(SixteenBytes bytes) {
 #if defined(__SSE2__)
@@ -62,6 +56,24 @@ inline void store_bytes(SixteenBytes bytes, std::uint8_t* to) {
     for (int i = 0; i < kByteLanes; ++i) sum += bytes[i];
     return sum;
 #endif
+}
+
+// The byte that `rank` others are no greater than; 0 <= rank < 16. Without branches that depend on them.
+[[nodiscard]] inline std::uint8_t ranked_byte(SixteenBytes bytes, std::uint32_t rank) {
+    std::uint32_t level = 0;
+    for (std::uint32_t bit = 128; bit > 0; bit /= 2) {
+        const SixteenBytes most = SixteenBytes{} + static_cast<std::uint8_t>(level + bit - 1);
+        const SixteenBytes lesser = bytes < most ? bytes : most;
+        const std::uint32_t within = sum_of_bytes(reinterpret_cast<SixteenBytes>(lesser == bytes) & 1);
+        level += within <= rank ? bit : 0;
+    }
+    return static_cast<std::uint8_t>(level);
+}
+
+// Sums of neighbours: byte 2i + byte 2i + 1 in lane i.
+[[nodiscard]] inline EightSums sums_of_pairs(SixteenBytes bytes) {
+    const auto pairs = reinterpret_cast<EightSums>(bytes);
+    return (pairs & 0xFF) + (pairs >> 8);
 }
 
 // One bit per byte of a word of bytes that are zero or odd, lowest address first.

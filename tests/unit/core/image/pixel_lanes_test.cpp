@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -60,6 +61,18 @@ TEST(PixelLanes, BytesComeFromLanesAndFromEveryBlock) {
             EXPECT_EQ(back[i], bytes[static_cast<std::size_t>(i)]);
             EXPECT_EQ(spread[i], bytes[static_cast<std::size_t>(i / 4)]);
         }
+    }
+}
+
+TEST(PixelLanes, RanksAreThoseOfSortedBytes) {
+    test::SeededRandom random(7);
+    for (int round = 0; round < 100; ++round) {
+        std::array<std::uint8_t, 16> bytes;
+        const std::uint32_t values = round % 2 == 0 ? 256 : 4;  // with repeats
+        for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(255 - random.below(values));
+        const SixteenBytes lanes = load_bytes(bytes.data());
+        std::sort(bytes.begin(), bytes.end());
+        for (std::uint32_t rank = 0; rank < 16; ++rank) EXPECT_EQ(ranked_byte(lanes, rank), bytes[rank]);
     }
 }
 
