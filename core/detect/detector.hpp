@@ -83,7 +83,7 @@ inline constexpr double kWindowShare = 0.75;
 // How often a blob that is no marker is cut again.
 inline constexpr std::size_t kSplitLevels = 3;
 
-// One camera's detector. Memory is fixed (about 1.8 MB); detect() never allocates and never fails: hard data
+// One camera's detector. Memory is fixed (about 1.9 MB); detect() never allocates and never fails: hard data
 // give few observations and a report. The order of observations says nothing.
 class Detector {
   public:
