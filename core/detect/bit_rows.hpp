@@ -37,14 +37,52 @@ using BitRows = std::array<std::uint64_t, kBlobWindowPx>;
     return row & (row + (row & (~row + 1)));
 }
 
-[[nodiscard]] int count_bits(const BitRows& rows, int height);
+[[nodiscard]] int count_bits(const BitRows& rows, int top, int bottom);
+
+// The first `height` rows; without a library's call for so few bytes.
+inline void copy_rows(const BitRows& from, int height, BitRows& to) {
+    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) to[y] = from[y];
+}
+
+// Rows [top, bottom), columns [left, right).
+struct BitBox {
+    int left = 0;
+    int top = 0;
+    int right = 0;
+    int bottom = 0;
+};
+
+// The least box around the bits from row `top` to `bottom` (exclusive); all zero without any.
+[[nodiscard]] BitBox box_of(const BitRows& rows, int top, int bottom);
+
+// By so many pixels on every side, as far as the window goes.
+[[nodiscard]] BitBox widened(const BitBox& box, int by, int width, int height);
 
 // One step into the four (eight) neighbours.
 void grow_cross(BitRows& rows, int height);
 void grow_square(BitRows& rows, int height);
 
+// Into the eight neighbours and then into the four of each: a step of an octagon, nearly a disc of radius 2.
+void grow_octagon(BitRows& rows, int height);
+
+// moat: from one step outside the set to one octagon farther; ring: the next octagon. Rows and columns that
+// the window does not have are left out.
+void draw_surroundings(const BitRows& rows, int width, int height, BitRows& moat, BitRows& ring);
+void draw_moat(const BitRows& rows, int width, int height, BitRows& moat);
+
+// `own` and `others` grow towards each other, `steps` steps into the four and the eight neighbours by turns:
+// what one has first the other does not get; what both reach at once is in `own` only. others: what they have
+// at the end.
+void share_out(const BitRows& own, BitRows& others, int steps, int width, int height);
+
+// True if every row from top to bottom (exclusive) is one run that touches the row before: then the set is
+// connected and has no holes.
+[[nodiscard]] bool is_one_stack(const BitRows& rows, int top, int bottom);
+
 // Keeps the part of `allowed` that is connected (eight neighbours) with `seed`; the result is in `seed`.
 void flood(BitRows& seed, const BitRows& allowed, int height);
+// The same among the rows from top to bottom (exclusive).
+void flood(BitRows& seed, const BitRows& allowed, int top, int bottom);
 
 // Fills every hole of `rows`: pixels that four-connected steps outside the set cannot reach from the border.
 void fill_holes(BitRows& rows, int width, int height);

@@ -6,6 +6,7 @@
 #include "core/base/math.hpp"
 #include "core/detect/blob_shape.hpp"
 #include "core/detect/hidden_part.hpp"
+#include "core/detect/window_sums.hpp"
 #include "core/image/pixel_lanes.hpp"
 
 namespace rig {
@@ -21,12 +22,12 @@ constexpr float kLeastShare = 0.4F;     // of the light at the centre that a pix
 constexpr float kGreatestShare = 2.5F;  // so that a bad plane cannot run away
 constexpr int kRedrawReach = 2;         // px that a redrawn outline may lie outside the old one
 constexpr int kMoatReach = 3;           // px
+constexpr int kRingReach = 5;           // px
 constexpr int kOpen = static_cast<int>(kFull * kOpenCover);
 constexpr int kCorePercent =
     30;  // of the blob's pixels are darker than its core: clear of noise, glints and edge
-constexpr int kMinRing = 12;    // pixels that can carry a plane
-constexpr int kRounds = 2;      // outline -> background -> outline
-constexpr int kFraction = 256;  // of a grey level: fixed point of the background plane
+constexpr int kMinRing = 12;  // pixels that can carry a plane
+constexpr int kRounds = 2;    // outline -> background -> outline
 
 // Grey level at column x, row y of the window: level + slope_x (x - centre_x) + slope_y (y - centre_y).
 struct Plane {
@@ -41,23 +42,6 @@ struct Plane {
     }
 };
 
-template <class Visit>
-void for_each_bit(const BitRows& rows, int height, Visit visit) {
-    for (int y = 0; y < height; ++y) {
-        for (std::uint64_t bits = rows[static_cast<std::size_t>(y)]; bits != 0; bits &= bits - 1) {
-            visit(std::countr_zero(bits), y);
-        }
-    }
-}
-
-int value_at(const BlobWorkspace& w, int x, int y) {
-    return w.values[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)];
-}
-
-int cover_at(const BlobWorkspace& w, int x, int y) {
-    return w.cover[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)];
-}
-
 void load_window(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,
                  BlobWorkspace& w) {
     w.left = std::max(0, component.left - kMargin);
@@ -65,20 +49,27 @@ void load_window(const ImageView& image, Side side, const Component& component, 
     w.width = std::min(image.width_px, component.right + 1 + kMargin) - w.left;
     w.height = std::min(image.height_px, component.bottom + 1 + kMargin) - w.top;
     const std::uint8_t turn = side == Side::kAbove ? 255 : 0;
+    const bool whole_vectors = w.left + static_cast<int>(BlobWorkspace::kPitch) <= image.width_px;
     for (int y = 0; y < w.height; ++y) {
         const std::uint8_t* pixels = image.row(w.top + y) + w.left;
-        auto& row = w.values[static_cast<std::size_t>(y)];
-        for (std::size_t x = 0; x < static_cast<std::size_t>(w.width); ++x) row[x] = pixels[x] ^ turn;
+        std::uint8_t* row = w.values[static_cast<std::size_t>(y)].data();
+        if (whole_vectors) {
+            for (int x = 0; x < w.width; x += kByteLanes) store_bytes(load_bytes(pixels + x) ^ turn, row + x);
+        } else {
+            for (int x = 0; x < w.width; ++x) row[x] = pixels[x] ^ turn;
+        }
     }
-    w.blob.fill(0);
+    std::fill_n(w.blob.begin(), w.height, std::uint64_t{0});
     for (const Run& run : runs) {
         w.blob[static_cast<std::size_t>(run.y - w.top)] |= bit_span(run.begin - w.left, run.end - w.left);
     }
+    w.box = {component.left - w.left, component.top - w.top, component.right + 1 - w.left,
+             component.bottom + 1 - w.top};
 }
 
 // The blob and its siblings grow towards each other; what the siblings reach first is theirs.
 void claim_foreign(const Component& component, const Siblings& siblings, BlobWorkspace& w) {
-    w.foreign.fill(0);
+    std::fill_n(w.foreign.begin(), w.height, std::uint64_t{0});
     std::uint64_t any = 0;
     for (const Component& other : siblings.components) {
         const bool apart = other.right < w.left || other.left >= w.left + w.width || other.bottom < w.top ||
@@ -100,54 +91,17 @@ void claim_foreign(const Component& component, const Siblings& siblings, BlobWor
     if (any == 0) return;
     const int steps =
         (std::max(component.right - component.left, component.bottom - component.top) + 1) / 2 + kMoatReach;
-    const std::uint64_t mask = row_mask(w.width);
-    BitRows own = w.blob;
-    for (int step = 0; step < steps; ++step) {
-        const BitRows theirs = w.foreign;
-        const BitRows ours = own;
-        const auto grow = step % 2 == 0 ? grow_cross : grow_square;  // an octagon: nearly a disc
-        grow(own, w.height);
-        grow(w.foreign, w.height);
-        for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) {
-            own[y] &= ~theirs[y] & mask;
-            w.foreign[y] &= ~(ours[y] | own[y]) & mask;  // a tie is ours: both measure the pixels on the line
-        }
-    }
+    share_out(w.blob, w.foreign, steps, w.width, w.height);
 }
 
 // Moat: the pixels from one to three steps outside the blob. Ring: from three to five.
-void draw_surroundings(BlobWorkspace& w) {
-    const std::uint64_t mask = row_mask(w.width);
-    BitRows& grown = w.scratch;
-    grown = w.blob;
-    grow_square(grown, w.height);
-    const BitRows inner = grown;
-    grow_cross(grown, w.height);
-    grow_square(grown, w.height);
-    const BitRows middle = grown;
-    grow_cross(grown, w.height);
-    grow_square(grown, w.height);
-    for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) {
-        w.moat[y] = middle[y] & ~inner[y] & mask;
-        w.ring[y] = grown[y] & ~middle[y] & ~w.foreign[y] & mask;
-    }
+void draw_ring(BlobWorkspace& w) {
+    draw_surroundings(w.blob, w.width, w.height, w.moat, w.ring);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) w.ring[y] &= ~w.foreign[y];
 }
 
-// The value that `percent` of the pixels lie below or at; 0 for an empty set.
-int percentile(const BitRows& rows, int percent, BlobWorkspace& w) {
-    w.histogram.fill(0);
-    std::uint32_t count = 0;
-    for_each_bit(rows, w.height, [&](int x, int y) {
-        ++w.histogram[static_cast<std::size_t>(value_at(w, x, y))];
-        ++count;
-    });
-    const std::uint32_t rank = count * static_cast<std::uint32_t>(percent) / 100;
-    std::uint32_t seen = 0;
-    for (std::size_t v = 0; v < 256; ++v) {
-        seen += w.histogram[v];
-        if (seen > rank) return static_cast<int>(v);
-    }
-    return 0;
+BitBox ring_box(const BlobWorkspace& w) {
+    return widened(w.box, kRingReach, w.width, w.height);
 }
 
 struct PlaneFit {
@@ -157,45 +111,15 @@ struct PlaneFit {
 };
 
 int fixed_point(double value) {
-    const double scaled = std::clamp(value, -1e6, 1e6) * kFraction;
+    const double scaled = std::clamp(value, -1e6, 1e6) * kLevelFraction;
     return static_cast<int>(scaled < 0.0 ? scaled - 0.5 : scaled + 0.5);
 }
 
-struct PlaneSums {
-    std::int64_t n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, v = 0, xv = 0, yv = 0, vv = 0;
-};
-
-// Over the ring pixels whose grey level is within `below` under and `above` over the guess. Integers: order
-// is free.
-PlaneSums sum_ring(const BlobWorkspace& w, const Plane& guess, double below, double above) {
-    const int slope_x = fixed_point(guess.slope_x);
-    const int slope_y = fixed_point(guess.slope_y);
-    const int lowest = fixed_point(guess.level - below);
-    const auto reach = static_cast<unsigned>(std::max(0, fixed_point(below + above)));
-    PlaneSums sums;
-    for (int py = 0; py < w.height; ++py) {
-        const int y = py - guess.centre_y;
-        const int row_lowest = lowest + slope_y * y - slope_x * guess.centre_x;
-        int n = 0, sx = 0, sxx = 0, sv = 0, sxv = 0, svv = 0;
-        for (std::uint64_t bits = w.ring[static_cast<std::size_t>(py)]; bits != 0; bits &= bits - 1) {
-            const int px = std::countr_zero(bits);
-            const int v = value_at(w, px, py);
-            const int x = px - guess.centre_x;
-            const int keep =
-                static_cast<unsigned>(v * kFraction - row_lowest - slope_x * px) <= reach ? 1 : 0;
-            const int kept_v = keep * v;
-            n += keep, sx += keep * x, sxx += keep * x * x, sv += kept_v, sxv += kept_v * x,
-                svv += kept_v * v;
-        }
-        sums.n += n, sums.x += sx, sums.xx += sxx, sums.v += sv, sums.xv += sxv, sums.vv += svv;
-        sums.y += std::int64_t{n} * y, sums.xy += std::int64_t{sx} * y, sums.yy += std::int64_t{n} * y * y;
-        sums.yv += std::int64_t{sv} * y;
-    }
-    return sums;
-}
-
+// To the ring pixels whose grey level is within `below` under and `above` over the guess.
 PlaneFit fit_plane(const BlobWorkspace& w, const Plane& guess, double below, double above) {
-    const PlaneSums s = sum_ring(w, guess, below, above);
+    const LevelBand band{fixed_point(guess.level - below), fixed_point(guess.slope_x),
+                         fixed_point(guess.slope_y), std::max(0, fixed_point(below + above))};
+    const PlaneSums s = sum_in_band(w, w.ring, ring_box(w), band, guess.centre_x, guess.centre_y);
     PlaneFit fit;
     if (s.n < kMinRing) return fit;
     // Centred normal equations, 2 x 2; every term is below 2^47, exact in doubles.
@@ -224,11 +148,11 @@ PlaneFit fit_plane(const BlobWorkspace& w, const Plane& guess, double below, dou
 
 // The skin around the blob as a plane. The first fit takes what is on the skin's side of mid contrast; refits
 // leave out what is clearly part of something else: other markers, shadows, the dark behind the face.
-PlaneFit first_background(BlobWorkspace& w, const Component& component, int core) {
+PlaneFit first_background(const BlobWorkspace& w, const Component& component, int core) {
     Plane guess;
     guess.centre_x = (component.left + component.right) / 2 - w.left;
     guess.centre_y = (component.top + component.bottom) / 2 - w.top;
-    guess.level = percentile(w.ring, 50, w);
+    guess.level = percentile(w, w.ring, ring_box(w), 50);
     const double depth = std::max(4.0, guess.level - core);
     return fit_plane(w, guess, 0.5 * depth, depth);
 }
@@ -240,62 +164,37 @@ PlaneFit refined_background(const BlobWorkspace& w, const PlaneFit& fit, int cor
     return again.ok ? again : fit;
 }
 
-struct Box {
-    int left = 0;
-    int top = 0;
-    int right = 0;   // exclusive
-    int bottom = 0;  // exclusive
-};
-
-// Of a blob that is not empty, widened by `by` and cut at the window.
-Box box_around(const BlobWorkspace& w, int by) {
-    Box box{0, -1, 0, 0};
-    std::uint64_t columns = 0;
-    for (int y = 0; y < w.height; ++y) {
-        const std::uint64_t row = w.blob[static_cast<std::size_t>(y)];
-        if (row == 0) continue;
-        if (box.top < 0) box.top = y;
-        box.bottom = y + 1;
-        columns |= row;
-    }
-    box.left = std::max(0, std::countr_zero(columns) - by);
-    box.right = std::min(w.width, 64 - std::countl_zero(columns) + by);
-    box.top = std::max(0, box.top - by);
-    box.bottom = std::min(w.height, box.bottom + by);
-    return box;
-}
-
-// Cover of every pixel that redrawing and judging can look at, clamped to -1..2 blobs so that 16 bits hold
-// it. Paint scales the light that falls on the skin, so the depth of a whole pixel of blob follows the
-// background's gradient; taking it as constant pulls centres towards the bright side (0.15 px on a shaded
-// forehead).
-void compute_cover(BlobWorkspace& w, Side side, const Plane& plane, double depth) {
+// Cover of the pixels up to so many around the blob, clamped to -1..2 blobs so that 16 bits hold it. Paint
+// scales the light that falls on the skin, so the depth of a whole pixel of blob follows the background's
+// gradient; taking it as constant pulls centres towards the bright side (0.15 px on a shaded forehead).
+void compute_cover(BlobWorkspace& w, Side side, const Plane& plane, double depth, int around_px) {
     const float black = side == Side::kBelow ? 0.0F : 255.0F;
     const double light = side == Side::kBelow ? 1.0 : -1.0;
     const double centre_light = std::max(1.0, light * (plane.level - static_cast<double>(black)));
     const auto to_share = static_cast<float>(light / centre_light);
     const auto scale = static_cast<float>(kFull / depth);
     const auto slope = static_cast<float>(plane.slope_x);
-    const Box box = box_around(w, kRedrawReach + kMoatReach);
+    const BitBox box = widened(w.box, around_px, w.width, w.height);
     const auto bounded = [](FourFloats v, float least, float most) {
-        v = v > all_four(least) ? v : all_four(least);
-        return v < all_four(most) ? v : all_four(most);
+        return less_of(greater_of(v, all_four(least)), all_four(most));
     };
     const auto cover_of = [&](FourFloats level, FourFloats value) {
         const FourFloats share = bounded((level - black) * to_share, kLeastShare, kGreatestShare);
         return bounded((level - value) * scale / share, -256.0F, 512.0F);
     };
-    const int first = box.left / kPixelLanes * kPixelLanes;
+    std::array<float, kBlobWindowPx> row_levels;
     for (int y = box.top; y < box.bottom; ++y) {
-        const std::uint8_t* values = w.values[static_cast<std::size_t>(y)].data();
-        std::int16_t* cover = w.cover[static_cast<std::size_t>(y)].data();
-        const auto row_level = static_cast<float>(plane.at(0.0, y));
-        for (int x = first; x < box.right; x += kPixelLanes) {
-            const EightFloats at = floats_of_lanes(counting_lanes(x));
-            const EightFloats value = floats_of_lanes(load_pixels(values + x, 0));
-            const PixelLanes lanes = truncated_lanes({cover_of(row_level + slope * at.low, value.low),
-                                                      cover_of(row_level + slope * at.high, value.high)});
-            std::memcpy(cover + x, &lanes, sizeof(lanes));
+        row_levels[static_cast<std::size_t>(y)] = static_cast<float>(plane.at(0.0, y));
+    }
+    for (int x = box.left; x < box.right; x += kPixelLanes) {
+        const EightFloats at = floats_of_lanes(counting_lanes(x));
+        const EightFloats column{slope * at.low, slope * at.high};
+        for (auto y = static_cast<std::size_t>(box.top); y < static_cast<std::size_t>(box.bottom); ++y) {
+            const EightFloats value = floats_of_lanes(load_pixels(w.values[y].data() + x, 0));
+            const float level = row_levels[y];
+            const PixelLanes lanes = truncated_lanes(
+                {cover_of(level + column.low, value.low), cover_of(level + column.high, value.high)});
+            std::memcpy(w.cover[y].data() + x, &lanes, sizeof(lanes));
         }
     }
 }
@@ -303,42 +202,43 @@ void compute_cover(BlobWorkspace& w, Side side, const Plane& plane, double depth
 // Pixels near the old blob whose cover reaches `outline`; inside it, when that is the half outline already:
 // cover is known so far around the blob that was found, and no farther.
 void mark_covered(const BlobWorkspace& w, int outline, BitRows& covered) {
-    const Box box = box_around(w, kRedrawReach);
-    covered = w.blob;
-    if (outline == kHalf) {
-        grow_square(covered, w.height);
-        grow_cross(covered, w.height);
-    }
-    for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) covered[y] &= ~w.foreign[y];
-    for (auto y = static_cast<std::size_t>(box.top); y < static_cast<std::size_t>(box.bottom); ++y) {
-        std::uint64_t bits = 0;
-        for (std::size_t x = static_cast<std::size_t>(box.left) / 8 * 8;
-             x < static_cast<std::size_t>(box.right); x += 8) {
-            std::array<std::uint8_t, 8> reached;
-            for (std::size_t k = 0; k < 8; ++k) reached[k] = w.cover[y][x + k] >= outline ? 1 : 0;
-            bits |= std::uint64_t{packed_bytes(std::bit_cast<std::uint64_t>(reached))} << x;
-        }
-        covered[y] &= bits;
+    const BitBox box = widened(w.box, kRedrawReach, w.width, w.height);
+    copy_rows(w.blob, w.height, covered);
+    if (outline == kHalf) grow_octagon(covered, w.height);
+    for (int y = box.top; y < box.bottom; ++y) {
+        const auto row = static_cast<std::size_t>(y);
+        covered[row] &=
+            covered_bits(w, y, box.left, box.right, outline) & ~w.foreign[row] & row_mask(w.width);
     }
 }
 
 // The largest connected piece of `rest`, which loses all its pieces.
-int largest_piece(BitRows& rest, int height, BitRows& best) {
+int largest_piece(BitRows& rest, int height, const BitBox& box, BitRows& best) {
+    BitRows pieces[2];
+    BitRows* seed = &pieces[0];
+    BitRows* largest = &pieces[1];
+    for (BitRows& piece : pieces) std::fill_n(piece.begin(), height, std::uint64_t{0});
+    const auto bottom = static_cast<std::size_t>(box.bottom);
+    auto y = static_cast<std::size_t>(box.top);
     int best_count = 0;
     for (int piece = 0; piece < 8; ++piece) {  // more pieces than that are noise
-        std::size_t y = 0;
-        while (y < static_cast<std::size_t>(height) && rest[y] == 0) ++y;
-        if (y == static_cast<std::size_t>(height)) break;
-        BitRows seed{};
-        seed[y] = rest[y] & (~rest[y] + 1);
-        flood(seed, rest, height);
-        const int count = count_bits(seed, height);
-        for (std::size_t k = 0; k < static_cast<std::size_t>(height); ++k) rest[k] &= ~seed[k];
+        while (y < bottom && rest[y] == 0) ++y;
+        if (y == bottom) break;
+        std::fill(seed->begin() + box.top, seed->begin() + box.bottom, std::uint64_t{0});
+        (*seed)[y] = rest[y] & (~rest[y] + 1);
+        flood(*seed, rest, static_cast<int>(y), box.bottom);
+        int count = 0;
+        for (std::size_t k = y; k < bottom; ++k) {
+            if ((*seed)[k] == 0) continue;
+            count += ones((*seed)[k]);
+            rest[k] &= ~(*seed)[k];
+        }
         if (count > best_count) {
-            best = seed;
             best_count = count;
+            std::swap(seed, largest);
         }
     }
+    copy_rows(*largest, height, best);
     return best_count;
 }
 
@@ -347,59 +247,62 @@ int largest_piece(BitRows& rest, int height, BitRows& best) {
 bool redraw_blob(BlobWorkspace& w, int outline, Rejection& reason) {
     BitRows& covered = w.scratch;
     mark_covered(w, outline, covered);
-    const int total = count_bits(covered, w.height);
-    BitRows best{};
-    const int count = largest_piece(covered, w.height, best);
-    reason = count == 0 ? Rejection::kSmall : Rejection::kSeveral;
-    if (count == 0 || (total - count) * 5 > total) return false;
-    w.blob = best;
+    const BitBox near = widened(w.box, kRedrawReach, w.width, w.height);
+    const BitBox box = box_of(covered, near.top, near.bottom);
+    reason = Rejection::kSmall;
+    if (box.top == box.bottom) return false;
+    if (is_one_stack(covered, box.top, box.bottom)) {
+        copy_rows(covered, w.height, w.blob);
+        w.box = box;
+        return true;
+    }
+    const int total = count_bits(covered, box.top, box.bottom);
+    BitRows best;
+    const int count = largest_piece(covered, w.height, box, best);
+    reason = Rejection::kSeveral;
+    if ((total - count) * 5 > total) return false;
+    copy_rows(best, w.height, w.blob);
     fill_holes(w.blob, w.width, w.height);
+    w.box = box_of(w.blob, box.top, box.bottom);
     return true;
 }
 
-// The pixels of the blob whose neighbours are all in it.
-BitRows interior(const BlobWorkspace& w) {
-    BitRows inner = w.blob;
-    for (std::uint64_t& row : inner) row = ~row;
-    grow_square(inner, w.height);
-    for (std::size_t y = 0; y < inner.size(); ++y) inner[y] = w.blob[y] & ~inner[y];
-    return inner;
+// The pixels of the blob whose neighbours are all in it; it does not reach the window's border.
+void draw_interior(const BlobWorkspace& w, BitRows& inner) {
+    std::uint64_t above = 0;
+    std::uint64_t here = 0;
+    for (int y = w.box.top; y < w.box.bottom; ++y) {
+        const auto row = static_cast<std::size_t>(y);
+        here = w.blob[row];
+        const std::uint64_t below = y + 1 < w.box.bottom ? w.blob[row + 1] : 0;
+        const std::uint64_t column = above & here & below;
+        inner[row] = column & column << 1 & column >> 1;
+        above = here;
+    }
 }
 
 // Weights of the soft threshold over the blob and one step around it. What lies within it counts as blob
 // whatever it looks like: glints that are dimmer than skin.
 SoftMoments soft_moments(BlobWorkspace& w, int outline) {
     BitRows& region = w.scratch;
-    region = w.blob;
+    copy_rows(w.blob, w.height, region);
     grow_square(region, w.height);
     for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y)
         region[y] &= ~w.foreign[y] & ~w.hidden[y];
-    const BitRows inner = interior(w);
-    const int low = outline - kRamp;
-    const int high = outline + kRamp;
-    std::int64_t n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
-    for (int y = 0; y < w.height; ++y) {
-        const std::uint64_t rim = w.blob[static_cast<std::size_t>(y)];
-        const std::uint64_t inside = inner[static_cast<std::size_t>(y)];
-        int rn = 0, rx = 0, rxx = 0;
-        for (std::uint64_t bits = region[static_cast<std::size_t>(y)]; bits != 0; bits &= bits - 1) {
-            const int x = std::countr_zero(bits);
-            const int least = (inside >> x & 1U) != 0 ? high : (rim >> x & 1U) != 0 ? outline : low;
-            const int weight = std::clamp(cover_at(w, x, y), least, high) - low;
-            rn += weight, rx += weight * x, rxx += weight * x * x;
-        }
-        n += rn, sx += rx, sxx += rxx, sy += std::int64_t{rn} * y;
-        sxy += std::int64_t{rx} * y, syy += std::int64_t{rn} * y * y;
-    }
+    BitRows inner;
+    std::fill_n(inner.begin(), w.height, std::uint64_t{0});
+    draw_interior(w, inner);
+    const BitBox box = widened(w.box, 1, w.width, w.height);
+    const WeightSums s = sum_weights(w, region, w.blob, inner, box, outline, kRamp);
     SoftMoments m;
-    if (n == 0) return m;
-    const auto count = static_cast<double>(n);
+    if (s.w == 0) return m;
+    const auto count = static_cast<double>(s.w);
     m.weight = count / (2 * kRamp);
-    m.x = static_cast<double>(sx) / count;
-    m.y = static_cast<double>(sy) / count;
-    m.xx = static_cast<double>(n * sxx - sx * sx) / (count * count);
-    m.xy = static_cast<double>(n * sxy - sx * sy) / (count * count);
-    m.yy = static_cast<double>(n * syy - sy * sy) / (count * count);
+    m.x = static_cast<double>(s.x + box.left * s.w) / count;
+    m.y = static_cast<double>(s.y + box.top * s.w) / count;
+    m.xx = static_cast<double>(s.w * s.xx - s.x * s.x) / (count * count);
+    m.xy = static_cast<double>(s.w * s.xy - s.x * s.y) / (count * count);
+    m.yy = static_cast<double>(s.w * s.yy - s.y * s.y) / (count * count);
     return m;
 }
 
@@ -409,7 +312,7 @@ double outline_deviation_px(const BlobWorkspace& w, const SoftMoments& m, double
     const double determinant = m.xx * m.yy - m.xy * m.xy;
     if (determinant <= 0.0) return kBlobWindowPx;
     // Row by row the ellipse a dx^2 + b dx dy + c dy^2 <= 4 is one span.
-    const Box box = box_around(w, 2);
+    const BitBox box = widened(w.box, 2, w.width, w.height);
     const double a = m.yy / determinant;
     const double b = -2.0 * m.xy / determinant;
     const double c = m.xx / determinant;
@@ -432,31 +335,31 @@ double outline_deviation_px(const BlobWorkspace& w, const SoftMoments& m, double
 }
 
 double open_part(const BlobWorkspace& w) {
+    const BitBox box = widened(w.box, kMoatReach, w.width, w.height);
     int open = 0;
     int total = 0;
-    for_each_bit(w.moat, w.height, [&](int x, int y) {
-        open += cover_at(w, x, y) > kOpen ? 1 : 0;
-        ++total;
-    });
+    for (int y = box.top; y < box.bottom; ++y) {
+        const std::uint64_t moat = w.moat[static_cast<std::size_t>(y)];
+        const std::uint64_t dusky = moat & covered_bits(w, y, box.left, box.right, kOpen + 1);
+        total += ones(moat);
+        if (dusky != 0) open += ones(dusky);
+    }
     return total == 0 ? 1.0 : static_cast<double>(open) / total;
 }
 
 bool touches_border(const ImageView& image, const BlobWorkspace& w) {
-    const auto last = static_cast<std::size_t>(w.height - 1);
-    std::uint64_t any = 0;
-    for (std::size_t y = 0; y <= last; ++y) any |= w.blob[y];
-    return (w.left == 0 && (any & 1U) != 0) || (w.top == 0 && w.blob[0] != 0) ||
-           (w.left + w.width == image.width_px && (any >> (w.width - 1) & 1U) != 0) ||
-           (w.top + w.height == image.height_px && w.blob[last] != 0);
+    return (w.left == 0 && w.box.left == 0) || (w.top == 0 && w.box.top == 0) ||
+           (w.left + w.width == image.width_px && w.box.right == w.width) ||
+           (w.top + w.height == image.height_px && w.box.bottom == w.height);
 }
 
 // Outline -> background -> outline, twice unless the first outline was already right.
 Rejection outline_at_mid_contrast(Side side, const Component& component, const BlobLimits& limits,
                                   BlobWorkspace& w, PlaneFit& fit, Blob& blob) {
-    int pixels = count_bits(w.blob, w.height);
+    int pixels = static_cast<int>(component.area_px);
     for (int round = 0; round < kRounds; ++round) {
-        draw_surroundings(w);
-        const int core = percentile(w.blob, kCorePercent, w);
+        draw_ring(w);
+        const int core = percentile(w, w.blob, w.box, kCorePercent);
         if (round == 0) fit = first_background(w, component, core);
         if (!fit.ok) return Rejection::kOpen;
         fit = refined_background(w, fit, core);
@@ -465,11 +368,11 @@ Rejection outline_at_mid_contrast(Side side, const Component& component, const B
         blob.depth =
             blob.contrast / std::max(1.0, side == Side::kBelow ? fit.plane.level : 255.0 - fit.plane.level);
         if (blob.contrast < limits.min_contrast) return Rejection::kFaint;
-        compute_cover(w, side, fit.plane, blob.contrast);
+        compute_cover(w, side, fit.plane, blob.contrast, kRedrawReach);
         Rejection reason = Rejection::kNone;
         if (!redraw_blob(w, kHalf, reason)) return reason;
         const int before = pixels;
-        pixels = count_bits(w.blob, w.height);
+        pixels = count_bits(w.blob, w.box.top, w.box.bottom);
         if (std::abs(pixels - before) * 4 <= before) break;
     }
     return Rejection::kNone;
@@ -481,7 +384,7 @@ void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, c
         blob.rejection = Rejection::kEdge;
         return;
     }
-    draw_surroundings(w);
+    draw_moat(w.blob, w.width, w.height, w.moat);
     const bool is_hidden = mark_hidden(w, fit.rms / blob.contrast, w.hidden);
     SoftMoments moments = soft_moments(w, outline);
     if (is_hidden) moments = complete_moments(moments, w.hidden, w.height);
@@ -512,6 +415,7 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
     PlaneFit fit;
     blob.rejection = outline_at_mid_contrast(side, component, limits, w, fit, blob);
     if (blob.rejection != Rejection::kNone) return blob;
+    compute_cover(w, side, fit.plane, blob.contrast, kMoatReach);
     measure_outline(image, fit, kHalf, limits, w, blob);
     Rejection reason = Rejection::kNone;
     if (looks_shadowed(blob.rejection) && redraw_blob(w, kDeep, reason)) {

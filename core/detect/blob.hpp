@@ -62,10 +62,12 @@ struct Blob {
     Rejection rejection = Rejection::kSmall;
 };
 
-// Scratch of measure_blob(): a window around the blob, values turned so that the blob is dark.
+// Scratch of measure_blob(): a window around the blob, values turned so that the blob is dark. Rows are
+// longer than the window, for vectors that begin inside it.
 struct BlobWorkspace {
-    std::array<std::array<std::uint8_t, kBlobWindowPx>, kBlobWindowPx> values{};
-    std::array<std::array<std::int16_t, kBlobWindowPx>, kBlobWindowPx>
+    static constexpr std::size_t kPitch = kBlobWindowPx + 16;
+    std::array<std::array<std::uint8_t, kPitch>, kBlobWindowPx> values{};
+    std::array<std::array<std::int16_t, kPitch>, kBlobWindowPx>
         cover{};  // 0..256: part of a pixel that is blob
     BitRows blob{};
     BitRows foreign{};  // nearer to another part of the same component
@@ -73,7 +75,7 @@ struct BlobWorkspace {
     BitRows moat{};
     BitRows ring{};
     BitRows scratch{};
-    std::array<std::uint32_t, 256> histogram{};
+    BitBox box{};  // around `blob`
     int left = 0;
     int top = 0;
     int width = 0;

@@ -10,52 +10,59 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
-std::uint32_t root_of(const std::uint32_t* parents, std::uint32_t run) {
-    while (parents[run] != run) run = parents[run];
-    return run;
+std::uint16_t root_of(const ComponentLabel* labels, std::uint16_t label) {
+    while (labels[label].parent != label) label = labels[label].parent;
+    return label;
 }
 
-// The smaller number becomes the root, so a component is named by its first run whatever the order of the
+// The smaller label becomes the root, so a component is named by its first run whatever the order of the
 // unions.
-std::uint32_t unite(std::uint32_t* parents, std::uint32_t a, std::uint32_t b) {
-    const std::uint32_t least = a < b ? a : b;
-    parents[a < b ? b : a] = least;
+std::uint16_t unite(ComponentLabel* labels, std::uint16_t a, std::uint16_t b) {
+    const std::uint16_t least = std::min(a, b);
+    ComponentLabel& other = labels[std::max(a, b)];
+    other.parent = least;
+    labels[least].area_px += other.area_px;
+    labels[least].count = static_cast<std::uint16_t>(labels[least].count + other.count);
     return least;
 }
 
-// Most runs touch one run of the row above and take its root; only a second one makes a union.
-void unite_rows(const Run* runs, std::uint32_t total, std::uint32_t* parents) {
+// Most runs touch one run of the row above and take its label; only a second one makes a union. Returns the
+// number of labels.
+std::uint32_t unite_rows(const Run* __restrict runs, std::uint32_t total, ComponentLabel* __restrict labels,
+                         std::uint16_t* __restrict label_of) {
+    std::uint32_t count = 0;
     std::uint32_t above = 0;  // runs of the row above that can still touch: from here
-    std::uint32_t above_end = 0;
-    std::uint32_t i = 0;
-    while (i < total) {
-        const std::uint32_t row = i;
-        const std::uint16_t y = runs[i].y;
-        if (above < above_end && runs[above].y + 1 != y) above = above_end;
-        for (; i < total && runs[i].y == y; ++i) {
-            const std::uint16_t begin = runs[i].begin;
-            const std::uint16_t end = runs[i].end;
-            while (above < above_end && runs[above].end < begin) ++above;  // equal touches diagonally
-            std::uint32_t root = i;
-            for (std::uint32_t k = above; k < above_end && runs[k].begin <= end; ++k) {
-                const std::uint32_t other = root_of(parents, parents[k]);
-                if (root == i) {
-                    root = other;
-                } else if (other != root) {
-                    root = unite(parents, root, other);
-                }
-            }
-            parents[i] = root;
+    std::uint32_t row = 0;    // to here, where the row of the run begins
+    int y = -2;
+    for (std::uint32_t i = 0; i < total; ++i) {
+        const Run run = runs[i];
+        if (run.y != y) {
+            above = y + 1 == run.y ? row : i;
+            row = i;
+            y = run.y;
         }
-        above = row;
-        above_end = i;
+        while (above < row && runs[above].end < run.begin) ++above;  // equal touches diagonally
+        std::uint16_t root = static_cast<std::uint16_t>(count);
+        if (above < row && runs[above].begin <= run.end) {
+            root = root_of(labels, label_of[above]);
+            for (std::uint32_t k = above + 1; k < row && runs[k].begin <= run.end; ++k) {
+                const std::uint16_t other = root_of(labels, label_of[k]);
+                if (other != root) root = unite(labels, root, other);
+            }
+        } else {
+            labels[count++] = {0, root, 0};
+        }
+        labels[root].area_px += static_cast<std::uint32_t>(run.end - run.begin);
+        ++labels[root].count;
+        label_of[i] = root;
     }
+    return count;
 }
 
-// A new component's, or kNone.
-std::uint32_t number_of(const Run& first, std::uint32_t area_px, const ComponentLimits& limits,
-                        std::span<Component> components, ComponentCounts& counts) {
-    if (area_px < limits.min_area_px) {
+// Of a new component, whose runs go to `next` and after; or kNone.
+std::uint32_t number_of(const ComponentLabel& root, const ComponentLimits& limits,
+                        std::span<Component> components, ComponentCounts& counts, std::uint32_t& next) {
+    if (root.area_px < limits.min_area_px) {
         ++counts.small;
         return kNone;
     }
@@ -63,7 +70,8 @@ std::uint32_t number_of(const Run& first, std::uint32_t area_px, const Component
         ++counts.dropped;
         return kNone;
     }
-    components[counts.components] = {0, 0, area_px, first.begin, first.y, 0, first.y};
+    components[counts.components] = {next, 0, root.area_px, 0xFFFF, 0, 0, 0};
+    next += root.count;
     return static_cast<std::uint32_t>(counts.components++);
 }
 
@@ -72,41 +80,31 @@ std::uint32_t number_of(const Run& first, std::uint32_t area_px, const Component
 ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits,
                         const ComponentStorage& storage) {
     const std::size_t total = runs.size();
-    RIG_CHECK(storage.parents.size() >= total && storage.areas.size() >= total &&
-              storage.grouped.size() >= total);
-    std::uint32_t* const parents = storage.parents.data();
-    std::uint32_t* const areas = storage.areas.data();
-    unite_rows(runs.data(), static_cast<std::uint32_t>(total), parents);
-    for (std::uint32_t i = 0; i < total; ++i) {
-        const std::uint32_t root = parents[parents[i]];  // parents come first, so the parent's is a root
-        parents[i] = root;
-        const auto length = static_cast<std::uint32_t>(runs[i].end - runs[i].begin);
-        areas[i] = root == i ? length : 0;
-        if (root != i) areas[root] += length;
-    }
+    RIG_CHECK(storage.labels.size() >= total && storage.label_of.size() >= total &&
+              storage.grouped.size() >= total && total <= kMaxRuns);
+    ComponentLabel* const labels = storage.labels.data();
+    std::uint16_t* const label_of = storage.label_of.data();
+    const std::uint32_t known = unite_rows(runs.data(), static_cast<std::uint32_t>(total), labels, label_of);
 
-    // Roots come before their members, so one pass numbers the components; areas[] of a root turns into its
-    // number.
+    // Roots come before what was joined to them, so one pass numbers the components.
     ComponentCounts counts;
-    for (std::uint32_t i = 0; i < total; ++i) {
-        const std::uint32_t root = parents[i];
-        if (root == i) areas[i] = number_of(runs[i], areas[i], limits, storage.components, counts);
-        const std::uint32_t number = areas[root];
-        parents[i] = number;
-        if (number != kNone) widen(storage.components[number], runs[i]);
+    std::uint32_t next = 0;
+    for (std::uint32_t i = 0; i < known; ++i) {
+        ComponentLabel& label = labels[i];
+        label.area_px = label.parent == i ? number_of(label, limits, storage.components, counts, next)
+                                          : labels[label.parent].area_px;
     }
 
-    std::uint32_t next = 0;
-    for (std::size_t c = 0; c < counts.components; ++c) {
-        storage.components[c].first = next;
-        next += storage.components[c].count;
-        storage.components[c].count = 0;
-    }
-    for (std::uint32_t i = 0; i < total; ++i) {
-        const std::uint32_t number = parents[i];
+    Run* const grouped = storage.grouped.data();
+    Component* const components = storage.components.data();
+    for (std::size_t i = 0; i < total; ++i) {
+        const std::uint32_t number = labels[label_of[i]].area_px;
         if (number == kNone) continue;
-        Component& component = storage.components[number];
-        storage.grouped[component.first + component.count++] = runs[i];
+        const Run run = runs[i];
+        Component& component = components[number];
+        if (component.count == 0) component.top = run.y;
+        grouped[component.first + component.count] = run;
+        widen(component, run);
     }
     return counts;
 }

@@ -38,10 +38,19 @@ struct ComponentLimits {
     std::uint32_t min_area_px = 1;
 };
 
-// Storage that connect() borrows: parents, areas and grouped are as long as the longest input.
+// Runs that are known to hang together while rows are still being joined.
+struct ComponentLabel {
+    std::uint32_t area_px = 0;  // then the number of its component
+    std::uint16_t parent = 0;   // a label that it was joined to, or itself
+    std::uint16_t count = 0;    // of runs
+};
+static_assert(kMaxRuns <= 65536);
+
+// Storage that connect() borrows: labels, label_of and grouped are as long as the longest input, which has at
+// most kMaxRuns.
 struct ComponentStorage {
-    std::span<std::uint32_t> parents;
-    std::span<std::uint32_t> areas;
+    std::span<ComponentLabel> labels;
+    std::span<std::uint16_t> label_of;  // by run
     std::span<Run> grouped;
     std::span<Component> components;
 };

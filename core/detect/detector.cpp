@@ -5,11 +5,13 @@
 #include "core/base/math.hpp"
 #include "core/detect/components.hpp"
 #include "core/image/kernels.hpp"
+#include "core/image/pixel_lanes.hpp"
 
 namespace rig {
 
 namespace {
 
+constexpr int kBlock = static_cast<int>(kBlockPx);
 constexpr int kLumaRows = 8;    // every so manieth row is enough for the mean
 constexpr int kCorePixels = 3;  // beyond one and a half thresholds
 constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
@@ -20,24 +22,41 @@ constexpr double kSureBadness = 0.7;      // below: good enough to say what the 
 constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
 constexpr double kHopelessBadness = 1.5;  // score 0
 
-// The parts of `runs` for which inside(x, y) holds, as runs.
-template <class Inside>
-std::size_t cut(std::span<const Run> runs, std::span<Run> out, bool& truncated, Inside inside) {
+// Sixteen pixels of a row from x on; beyond the image, zeros.
+SixteenBytes pixels_at(const ImageView& image, int x, int y) {
+    const std::uint8_t* from = image.row(y) + x;
+    if (x + kByteLanes <= image.width_px) return load_bytes(from);
+    std::array<std::uint8_t, kByteLanes> rest{};
+    std::copy(from, image.row(y) + image.width_px, rest.begin());
+    return load_bytes(rest.data());
+}
+
+// The parts of `runs` whose pixels are marked, as runs; marked(x, y, count): one bit for each of up to
+// sixteen pixels from x on, bits beyond them mean nothing.
+template <class Marked>
+std::size_t cut(std::span<const Run> runs, std::span<Run> out, bool& truncated, Marked marked) {
     std::size_t count = 0;
     for (const Run& run : runs) {
         if (out.size() - count < static_cast<std::size_t>(run.end - run.begin) / 2 + 1) {
             truncated = true;
             break;
         }
-        int begin = -1;
-        for (int x = run.begin; x <= run.end; ++x) {
-            const bool in = x < run.end && inside(x, run.y);
-            if (in && begin < 0) begin = x;
-            if (!in && begin >= 0) {
-                out[count++] = {run.y, static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(x)};
-                begin = -1;
+        std::uint64_t inside = 0;  // whether the pixel before is
+        int begin = 0;
+        const auto turn = [&](int at) {
+            if (inside != 0) {
+                out[count++] = {run.y, static_cast<std::uint16_t>(begin), static_cast<std::uint16_t>(at)};
             }
+            begin = at;
+            inside ^= 1;
+        };
+        for (int x = run.begin; x < run.end; x += kByteLanes) {
+            const int pixels = std::min(kByteLanes, run.end - x);
+            const std::uint64_t bits = marked(x, run.y, pixels);
+            std::uint64_t changes = (bits ^ (bits << 1 | inside)) & row_mask(pixels);
+            for (; changes != 0; changes &= changes - 1) turn(x + std::countr_zero(changes));
         }
+        if (inside != 0) turn(run.end);
     }
     return count;
 }
@@ -56,27 +75,43 @@ bool in_range(double value, double low, double high) {
 std::size_t cut_at_background(const Detector::Search& search, std::span<const Run> runs, std::span<Run> out,
                               bool& truncated) {
     const bool dark = search.side == Side::kBelow;
-    return cut(runs, out, truncated, [&](int x, int y) {
-        const int value = search.image.row(y)[x];
-        const int level = search.level(x, y);
-        return dark ? value < level : value > level;
+    return cut(runs, out, truncated, [&](int x, int y, int pixels) {
+        const std::uint8_t* values = search.image.row(y) + x;
+        std::uint64_t bits = 0;
+        for (int i = 0; i < pixels; ++i) {
+            const int level = search.level(x + i, y);
+            if (dark ? values[i] < level : values[i] > level) bits |= std::uint64_t{1} << i;
+        }
+        return bits;
     });
 }
 
 std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span<const Run> runs,
                          std::span<Run> out, bool& truncated) {
     const std::uint8_t turn = search.side == Side::kBelow ? 255 : 0;
-    int deepest = 0;
-    int shallowest = 255;
+    SixteenBytes most{};
+    SixteenBytes least = most + 255;
     for (const Run& run : runs) {
-        const std::uint8_t* pixels = search.image.row(run.y);
-        for (int x = run.begin; x < run.end; ++x) {
-            deepest = std::max(deepest, pixels[x] ^ turn);
-            shallowest = std::min(shallowest, pixels[x] ^ turn);
+        for (int x = run.begin; x < run.end; x += kByteLanes) {
+            const SixteenBytes outside = ~bytes_of_bits(row_mask(std::min(kByteLanes, run.end - x)));
+            const SixteenBytes v = pixels_at(search.image, x, run.y) ^ turn;
+            most = most > (v & ~outside) ? most : (v & ~outside);
+            least = least < (v | outside) ? least : (v | outside);
         }
     }
+    int deepest = 0;
+    int shallowest = 255;
+    for (int i = 0; i < kByteLanes; ++i) {
+        deepest = std::max<int>(deepest, most[i]);
+        shallowest = std::min<int>(shallowest, least[i]);
+    }
     const int level = shallowest + static_cast<int>(depth * (deepest - shallowest));
-    return cut(runs, out, truncated, [&](int x, int y) { return (search.image.row(y)[x] ^ turn) > level; });
+    const SixteenBytes levels = SixteenBytes{} + static_cast<std::uint8_t>(level);
+    return cut(runs, out, truncated, [&](int x, int y, int) {
+        const SixteenBytes v = pixels_at(search.image, x, y) ^ turn;
+        const SixteenBytes lesser = v < levels ? v : levels;
+        return std::uint64_t{~bits_of_bytes(reinterpret_cast<SixteenBytes>(lesser == v))};
+    });
 }
 
 // Whether the middle of a component's box is part of it.
@@ -172,11 +207,7 @@ void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& threshold
         sliding_min(thresholds, radius, workspace_.slide);
         sliding_max(thresholds, radius, workspace_.slide);
     }
-    for (std::uint8_t& level : thresholds.values) {
-        const int step = std::max(least, level * part >> 8);
-        level = static_cast<std::uint8_t>(side == Side::kBelow ? std::max(0, level - step)
-                                                               : std::min(250, level + step));
-    }
+    step_levels(thresholds, side, least, part);
 }
 
 // Texture and noise just reach the threshold; a marker whose mid contrast does has pixels well beyond it.
@@ -186,14 +217,21 @@ bool Detector::has_core(const Search& search, std::span<const Run> runs) const {
     const int whole = search.side == Side::kBelow ? 256 - part : 256 + part;
     const int sign = search.side == Side::kBelow ? 1 : -1;
     int deep = 0;
+    int known = -1;  // the level that `most` is for
+    int most = 0;
     for (const Run& run : runs) {
         const std::uint8_t* pixels = search.image.row(run.y);
-        for (int x = run.begin; x < run.end; ++x) {
+        for (int x = run.begin; x < run.end;) {
             const int level = search.level(x, run.y);
-            const int step = std::max(least, level * part / whole);
-            deep += sign * (level - pixels[x]) * 2 >= step ? 1 : 0;
+            if (level != known) {  // twice the difference is a step or more
+                most = (std::max(least, level * part / whole) + 1) / 2;
+                known = level;
+            }
+            const int end = std::min<int>(run.end, x + kBlock - (x - search.left) % kBlock);
+            for (; x < end; ++x) {
+                if (sign * (level - pixels[x]) >= most && ++deep == kCorePixels) return true;
+            }
         }
-        if (deep >= kCorePixels) return true;
     }
     return false;
 }
@@ -210,7 +248,7 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     result.report.runs = static_cast<std::uint32_t>(count);
     const ComponentCounts counts =
         connect(std::span<const Run>(w.runs).first(count), {least_area_px(config_.blob)},
-                {w.parents, w.areas, w.grouped, w.components});
+                {w.labels, w.label_of, w.grouped, w.components});
     result.report.blobs_full = counts.dropped > 0;
     const Search search{image, thresholds, side, largest, 0, 0, image.width_px, image.height_px};
     for (std::size_t c = 0; c < counts.components; ++c) {
@@ -282,7 +320,7 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
     result.report.runs_full |= truncated;
     const ComponentCounts counts =
         connect(std::span<const Run>(storage.runs).first(count), {least_area_px(config_.blob)},
-                {w.parents, w.areas, storage.grouped, storage.components});
+                {w.labels, w.label_of, storage.grouped, storage.components});
     result.report.blobs_full |= counts.dropped > 0;
     const Siblings all{std::span<const Component>(storage.components).first(counts.components),
                        storage.grouped};
@@ -425,8 +463,8 @@ void Detector::detect(const ImageView& image, Observations& observations, Detect
         return;
     }
     report.whole_image = true;
-    measure_exposure(image, report);
     const BlockGrid means = block_means(image, workspace_.means);
+    measure_exposure(image, report);  // whose rows are now at hand
     finish(look(image, means, report), observations, report);
 }
 

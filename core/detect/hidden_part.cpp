@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "core/base/math.hpp"
+#include "core/detect/window_sums.hpp"
 
 namespace rig {
 
@@ -11,6 +12,7 @@ namespace {
 
 constexpr double kFull = 256.0;      // cover of a pixel that is all blob
 constexpr double kLeastNoise = 4.0;  // beyond the skin's level, in units of its own deviation
+constexpr int kNearReach = 2;        // px outside the blob where something may hide it
 constexpr int kRounds = 12;          // halve what is left, or better, up to three quarters of the way hidden
 constexpr double kStride = 2.0;      // of each; the plain step (1) falls short by the hidden part of the rim
 constexpr double kMostHidden = 0.4;  // of the ellipse
@@ -69,18 +71,18 @@ SoftMoments step_towards(const SoftMoments& from, const SoftMoments& to, double 
 }  // namespace
 
 bool mark_hidden(const BlobWorkspace& w, double noise_cover, BitRows& hidden) {
-    const auto least = static_cast<int>(-kFull * std::max(kHiddenCover, kLeastNoise * noise_cover));
-    BitRows near = w.blob;
-    grow_square(near, w.height);
-    grow_cross(near, w.height);
-    hidden.fill(0);
+    const double limit = -kFull * std::max(kHiddenCover, kLeastNoise * noise_cover);
+    const auto least = static_cast<int>(std::max(limit, -2.0 * kFull));  // no cover is that low
+    BitRows near;
+    copy_rows(w.blob, w.height, near);
+    grow_octagon(near, w.height);
+    std::fill_n(hidden.begin(), w.height, std::uint64_t{0});
+    const std::uint64_t mask = row_mask(w.width);
+    const BitBox box = widened(w.box, kNearReach, w.width, w.height);
     std::uint64_t any = 0;
-    for (int y = 0; y < w.height; ++y) {
+    for (int y = box.top; y < box.bottom; ++y) {
         const auto row = static_cast<std::size_t>(y);
-        for (std::uint64_t bits = near[row] & row_mask(w.width); bits != 0; bits &= bits - 1) {
-            const auto x = static_cast<std::size_t>(std::countr_zero(bits));
-            if (w.cover[row][x] < least) hidden[row] |= std::uint64_t{1} << x;
-        }
+        hidden[row] = near[row] & ~covered_bits(w, y, box.left, box.right, least) & mask;
         any |= hidden[row];
     }
     if (any == 0) return false;

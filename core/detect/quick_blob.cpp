@@ -7,6 +7,7 @@
 
 #include "core/base/math.hpp"
 #include "core/detect/blob_shape.hpp"
+#include "core/detect/row_weights.hpp"
 #include "core/image/pixel_lanes.hpp"
 
 namespace rig {
@@ -17,11 +18,12 @@ constexpr int kChunks = kQuickWindowPx / kPixelLanes;
 constexpr int kRimPx = 3;        // the window's rim carries the background
 constexpr int kRimSamples = 12;  // whose median is the first guess at it
 constexpr int kCoreSide = 4;     // px: the middle of the blob, whose
-constexpr int kCoreRank = 4;     // fifth darkest pixel is as dark as it gets, clear of noise and glints
-constexpr int kClip = 48;        // grey levels about the guess: 16 bits hold the sums of 48 rows of them
-constexpr int kCoarse = 16;      // fixed point of a distance from the background,
-constexpr int kFine = 32;        // and of an outline
-constexpr int kReach = 1;        // px that the outline may lie outside the start
+static_assert(kCoreSide * kCoreSide == kByteLanes);
+constexpr int kCoreRank = 4;  // fifth darkest pixel is as dark as it gets, clear of noise and glints
+constexpr int kClip = 48;     // grey levels about the guess: 16 bits hold the sums of 48 rows of them
+constexpr int kCoarse = 16;   // fixed point of a distance from the background,
+constexpr int kFine = 32;     // and of an outline
+constexpr int kReach = 1;     // px that the outline may lie outside the start
 constexpr double kFullWeight = 255.0;
 constexpr double kSure = 0.8;       // badness of a marker above which it is measured again, slowly
 constexpr double kSteepest = 0.8;   // change of the light from the window's centre to its corner
@@ -69,10 +71,11 @@ class RimLanes {
             keep &= (t >= test_.least) & (t <= test_.most);
         }
         const PixelLanes kept = t & keep;
-        const auto at = static_cast<std::int16_t>(y);
+        const PixelLanes at = all_lanes(y);
+        const PixelLanes kept_at = at & keep;
         n_ -= keep;
-        ny_ += keep & at;
-        nyy_ += keep & static_cast<std::int16_t>(at * at);
+        ny_ += kept_at;
+        nyy_ += kept_at * at;
         t_ += kept;
         ty_ += kept * at;
         tt_ += kept * kept >> 2;
@@ -91,20 +94,6 @@ class RimLanes {
     PixelLanes x_;
     PixelLanes level_;
     PixelLanes n_{}, ny_{}, nyy_{}, t_{}, ty_{}, tt_{};
-};
-
-// Weights of eight columns, summed over rows: once, weighted with the rows left, and with half their squares.
-struct WeightLanes {
-    PixelLanes sum{};
-    FourInts low{}, high{};
-    FourInts low_twice{}, high_twice{};
-
-    void add(PixelLanes weight) {
-        sum += weight;
-        const auto [a, b] = ints_of_lanes(sum);
-        low += a, high += b;
-        low_twice += low, high_twice += high;
-    }
 };
 
 // A grey level for every pixel, linear in x and y; in fixed point, each column rounded by itself.
@@ -196,13 +185,12 @@ int QuickMeasure::core_level() const {
         std::memcpy(&samples[static_cast<std::size_t>(i * kCoreSide)],
                     pixels(centre_y_ - kCoreSide / 2 + i) + centre_x_ - kCoreSide / 2, kCoreSide);
     }
-    for (std::uint8_t& sample : samples) sample ^= turn_;
-    std::nth_element(samples.begin(), samples.begin() + kCoreRank, samples.end());
-    return samples[kCoreRank];
+    return ranked_byte(load_bytes(samples.data()) ^ turn_, kCoreRank);
 }
 
 int QuickMeasure::rim_level() const {
-    std::array<std::uint8_t, kRimSamples> samples;
+    std::array<std::uint8_t, kByteLanes> samples;
+    samples.fill(255);  // those that are none come last
     for (int i = 0; i < kRimSamples / 4; ++i) {
         const int x = (2 * i + 1) * s_.width / (kRimSamples / 2);
         const int y = (2 * i + 1) * s_.height / (kRimSamples / 2);
@@ -212,8 +200,7 @@ int QuickMeasure::rim_level() const {
         samples[at + 2] = pixels(y)[1];
         samples[at + 3] = pixels(y)[s_.width - 2];
     }
-    std::nth_element(samples.begin(), samples.begin() + kRimSamples / 2, samples.end());
-    return samples[kRimSamples / 2] ^ turn_;
+    return ranked_byte(load_bytes(samples.data()), kRimSamples / 2) ^ turn_;
 }
 
 // Rim pixels whose grey level is within `below` under and `above` over the guess, or over the plane.
@@ -477,19 +464,17 @@ double QuickMeasure::deviation_px(const SoftMoments& m, double radius_px) const 
 // Of the moat, from one to three steps outside the blob, the part that is no background.
 double QuickMeasure::open_part(double contrast) const {
     if (clean_ >= kCleanRim) return 0.0;
-    BitRows& moat = w_.scratch;
-    std::fill_n(moat.begin(), s_.height, std::uint64_t{0});
-    std::copy(w_.blob.begin() + first_, w_.blob.begin() + last_ + 1, moat.begin() + first_);
-    grow_square(moat, s_.height);
-    const BitRows inner = moat;
-    grow_cross(moat, s_.height);
-    grow_square(moat, s_.height);
+    BitRows& moat = w_.moat;
+    BitRows& set = w_.set;
+    std::fill_n(set.begin(), s_.height, std::uint64_t{0});
+    std::copy(w_.blob.begin() + first_, w_.blob.begin() + last_ + 1, set.begin() + first_);
+    draw_moat(set, s_.width, s_.height, moat);
     const Slope level = level_at(kOpenCover, kFine, contrast);
     int total = 0;
     int open = 0;
     for (int y = 0; y < s_.height; ++y) {
         const auto at = static_cast<std::size_t>(y);
-        const std::uint64_t look = moat[at] & ~inner[at] & row_mask(s_.width);
+        const std::uint64_t look = moat[at];
         if (look == 0) continue;
         total += ones(look);
         const std::uint64_t dusky = marked(level, y, look);

@@ -26,7 +26,8 @@ struct QuickStart {
 
 struct QuickWorkspace {
     BitRows blob{};
-    BitRows scratch{};
+    BitRows set{};  // the same, with the rows outside it empty
+    BitRows moat{};
 };
 
 // The window around a component; false where it does not fit.

@@ -60,13 +60,18 @@ void sliding_min(const BlockGrid& grid, int radius, std::span<std::uint8_t> scra
 
 enum class Side : std::uint8_t { kBelow, kAbove };
 
-// Runs of pixels strictly below (above) the threshold of their block, in raster order. Returns how many were
-// written; stops at the end of a row that might not fit and then sets `truncated`.
+// Every level L moves away from the background, down for what is below it and up for what is above: by
+// max(least, L part / 256), down to 0 or up to 250. 0 <= least <= 255, 0 <= part <= 256.
+void step_levels(const BlockGrid& grid, Side side, int least, int part);
+
+// Runs of pixels strictly below (above) the threshold of their block, in raster order; a pixel none of whose
+// eight neighbours is beyond it is noise and left out. Returns how many were written; stops at the end of a
+// row that might not fit and then sets `truncated`.
 [[nodiscard]] std::size_t threshold_runs(const ImageView& image, const BlockGrid& thresholds, Side side,
                                          std::span<Run> runs, bool& truncated);
 
-// The same pixels as bits: pixel x of row y is bit x of rows[y]. The image is at most 64 pixels wide, `rows`
-// at least as long as it is high.
+// All such pixels as bits, lone ones too: pixel x of row y is bit x of rows[y]. The image is at most 64
+// pixels wide, `rows` at least as long as it is high.
 void threshold_bits(const ImageView& image, const BlockGrid& thresholds, Side side,
                     std::span<std::uint64_t> rows);
 

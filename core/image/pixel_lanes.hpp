@@ -1,6 +1,7 @@
 // Sixteen pixels at a time as bytes, eight as 16-bit lanes, four as floats. The width is fixed, whatever the
 // machine has, and every operation stands alone in its lane or adds integers, so the bits are those of a
-// plain loop.
+// plain loop. A few operations that compilers do not find by themselves are spelt with x86's names where it
+// is x86; elsewhere a vector expression gives the same bits.
 #pragma once
 
 #include <array>
@@ -19,8 +20,8 @@ using FourInts = std::int32_t __attribute__((vector_size(16)));
 inline constexpr int kByteLanes = 16;
 
 using SixteenBytes = std::uint8_t __attribute__((vector_size(16)));
+using SixteenChars = char __attribute__((vector_size(16)));  // as x86's operations have them
 using EightSums = std::uint16_t __attribute__((vector_size(16)));
-using EightSigned = std::int8_t __attribute__((vector_size(8)));
 
 [[nodiscard]] inline PixelLanes all_lanes(int value) {
     return PixelLanes{} + static_cast<std::int16_t>(value);
@@ -45,6 +46,30 @@ inline void store_bytes(SixteenBytes bytes, std::uint8_t* to) {
     std::memcpy(to, &bytes, sizeof(bytes));
 }
 
+// Of all sixteen.
+[[nodiscard]] inline std::uint32_t sum_of_bytes(SixteenBytes bytes) {
+#if defined(__SSE2__)
+    const auto halves = __builtin_ia32_psadbw128(reinterpret_cast<SixteenChars>(bytes), SixteenChars{});
+    return static_cast<std::uint32_t>(halves[0]) + static_cast<std::uint32_t>(halves[1]);
+#else
+    std::uint32_t sum = 0;
+    for (int i = 0; i < kByteLanes; ++i) sum += bytes[i];
+    return sum;
+#endif
+}
+
+// The byte that `rank` others are no greater than; 0 <= rank < 16. Without branches that depend on them.
+[[nodiscard]] inline std::uint8_t ranked_byte(SixteenBytes bytes, std::uint32_t rank) {
+    std::uint32_t level = 0;
+    for (std::uint32_t bit = 128; bit > 0; bit /= 2) {
+        const SixteenBytes most = SixteenBytes{} + static_cast<std::uint8_t>(level + bit - 1);
+        const SixteenBytes lesser = bytes < most ? bytes : most;
+        const std::uint32_t within = sum_of_bytes(reinterpret_cast<SixteenBytes>(lesser == bytes) & 1);
+        level += within <= rank ? bit : 0;
+    }
+    return static_cast<std::uint8_t>(level);
+}
+
 // Sums of neighbours: byte 2i + byte 2i + 1 in lane i.
 [[nodiscard]] inline EightSums sums_of_pairs(SixteenBytes bytes) {
     const auto pairs = reinterpret_cast<EightSums>(bytes);
@@ -58,9 +83,22 @@ inline void store_bytes(SixteenBytes bytes, std::uint8_t* to) {
 
 // One bit for each byte of 0xFF, none for those of 0.
 [[nodiscard]] inline std::uint32_t bits_of_bytes(SixteenBytes mask) {
+#if defined(__SSE2__)
+    return static_cast<std::uint32_t>(__builtin_ia32_pmovmskb128(reinterpret_cast<SixteenChars>(mask)));
+#else
     std::uint64_t words[2];
     std::memcpy(words, &mask, sizeof(words));
     return packed_bytes(words[0]) | packed_bytes(words[1]) << 8;
+#endif
+}
+
+// 0xFF in the bytes whose bit is set, lowest bit first; sixteen bits count.
+[[nodiscard]] inline SixteenBytes bytes_of_bits(std::uint64_t bits) {
+    using Words = std::uint64_t __attribute__((vector_size(16)));
+    constexpr std::uint64_t kEachByte = 0x0101010101010101ULL;
+    const Words spread{(bits & 0xFFU) * kEachByte, (bits >> 8 & 0xFFU) * kEachByte};
+    const SixteenBytes weights{1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128};
+    return reinterpret_cast<SixteenBytes>((reinterpret_cast<SixteenBytes>(spread) & weights) == weights);
 }
 
 [[nodiscard]] inline bool any_bit(SixteenBytes bytes) {
@@ -87,12 +125,43 @@ inline void store_bytes(SixteenBytes bytes, std::uint8_t* to) {
     return (all_lanes(static_cast<int>(bits & 0xFFU)) & weights) == weights;
 }
 
+// Lanes of -1 and 0 as bytes: those of `low`, then those of `high`.
+[[nodiscard]] inline SixteenBytes bytes_of_masks(PixelLanes low, PixelLanes high) {
+#if defined(__SSE2__)
+    return reinterpret_cast<SixteenBytes>(__builtin_ia32_packsswb128(low, high));
+#else
+    const auto a = reinterpret_cast<SixteenBytes>(low);
+    const auto b = reinterpret_cast<SixteenBytes>(high);
+    return __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+#endif
+}
+
+// Numbers of 0 to 255 as bytes: those of `low`, then those of `high`.
+[[nodiscard]] inline SixteenBytes bytes_of_lanes(PixelLanes low, PixelLanes high) {
+#if defined(__SSE2__)
+    return reinterpret_cast<SixteenBytes>(__builtin_ia32_packuswb128(low, high));
+#else
+    const auto a = reinterpret_cast<SixteenBytes>(low);
+    const auto b = reinterpret_cast<SixteenBytes>(high);
+    return __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+#endif
+}
+
+// Each of four bytes four times.
+[[nodiscard]] inline SixteenBytes load_four_times_each(const std::uint8_t* from) {
+    std::uint32_t word = 0;
+    std::memcpy(&word, from, sizeof(word));
+    using Words = std::uint32_t __attribute__((vector_size(16)));
+    const auto four = reinterpret_cast<SixteenBytes>(Words{word, 0, 0, 0});
+    const SixteenBytes twice =
+        __builtin_shufflevector(four, four, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7);
+    const auto pairs = reinterpret_cast<EightSums>(twice);
+    return reinterpret_cast<SixteenBytes>(__builtin_shufflevector(pairs, pairs, 0, 0, 1, 1, 2, 2, 3, 3));
+}
+
 // One bit for each lane of -1, none for those of 0.
 [[nodiscard]] inline std::uint64_t bits_of_lanes(PixelLanes mask) {
-    const EightSigned bytes = __builtin_convertvector(mask, EightSigned);
-    std::uint64_t word = 0;
-    std::memcpy(&word, &bytes, sizeof(word));
-    return packed_bytes(word);
+    return bits_of_bytes(bytes_of_masks(mask, PixelLanes{}));
 }
 
 struct EightFloats {
@@ -116,11 +185,31 @@ struct EightInts {
     return {__builtin_convertvector(whole.low, FourFloats), __builtin_convertvector(whole.high, FourFloats)};
 }
 
+// a > b ? a : b and a < b ? a : b, b also where one of them is no number.
+[[nodiscard]] inline FourFloats greater_of(FourFloats a, FourFloats b) {
+#if defined(__SSE2__)
+    return __builtin_ia32_maxps(a, b);
+#else
+    return a > b ? a : b;
+#endif
+}
+[[nodiscard]] inline FourFloats less_of(FourFloats a, FourFloats b) {
+#if defined(__SSE2__)
+    return __builtin_ia32_minps(a, b);
+#else
+    return a < b ? a : b;
+#endif
+}
+
 // Whole numbers within 16 bits, as lanes.
 [[nodiscard]] inline PixelLanes lanes_of_ints(const EightInts& v) {
+#if defined(__SSE2__)
+    return __builtin_ia32_packssdw128(v.low, v.high);
+#else
     const auto low = reinterpret_cast<PixelLanes>(v.low);
     const auto high = reinterpret_cast<PixelLanes>(v.high);
     return __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
+#endif
 }
 
 // Towards zero; |v| < 2^15.
@@ -145,11 +234,20 @@ struct EightInts {
     return sum_of_ints((both << 16 >> 16) + (both >> 16));
 }
 
-// Sum of a[i] b[i], each product in 32 bits.
-[[nodiscard]] inline int sum_of_products(PixelLanes a, PixelLanes b) {
+// a[2i] b[2i] + a[2i + 1] b[2i + 1] in 32 bits each.
+[[nodiscard]] inline FourInts products_of_pairs(PixelLanes a, PixelLanes b) {
+#if defined(__SSE2__)
+    return __builtin_ia32_pmaddwd128(a, b);
+#else
     const auto x = reinterpret_cast<FourInts>(a);
     const auto y = reinterpret_cast<FourInts>(b);
-    return sum_of_ints((x << 16 >> 16) * (y << 16 >> 16) + (x >> 16) * (y >> 16));
+    return (x << 16 >> 16) * (y << 16 >> 16) + (x >> 16) * (y >> 16);
+#endif
+}
+
+// Sum of a[i] b[i], each product in 32 bits.
+[[nodiscard]] inline int sum_of_products(PixelLanes a, PixelLanes b) {
+    return sum_of_ints(products_of_pairs(a, b));
 }
 
 }  // namespace rig

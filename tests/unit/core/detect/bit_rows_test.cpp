@@ -59,6 +59,95 @@ TEST(BitRows, GrowingReachesExactlyTheNeighbours) {
     }
 }
 
+BitRows octagon(BitRows rows, int height) {
+    grow_square(rows, height);
+    grow_cross(rows, height);
+    return rows;
+}
+
+TEST(BitRows, SurroundingsAreOctagonsAroundTheSet) {
+    SeededRandom random(7);
+    for (int round = 0; round < 100; ++round) {
+        const int width = 1 + static_cast<int>(random.below(64));
+        const int height = 1 + static_cast<int>(random.below(64));
+        const BitRows set = random_rows(random, width, height, 0.02);
+        BitRows inner = set;
+        grow_square(inner, height);
+        const BitRows middle = octagon(inner, height);
+        const BitRows outer = octagon(middle, height);
+        BitRows moat{};
+        BitRows ring{};
+        BitRows moat_alone{};
+        draw_surroundings(set, width, height, moat, ring);
+        draw_moat(set, width, height, moat_alone);
+        BitRows grown = set;
+        grow_octagon(grown, height);
+        for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
+            ASSERT_EQ(moat[y], middle[y] & ~inner[y] & row_mask(width));
+            ASSERT_EQ(moat_alone[y], moat[y]);
+            ASSERT_EQ(ring[y], outer[y] & ~middle[y] & row_mask(width));
+            ASSERT_EQ(grown[y], octagon(set, height)[y]);
+        }
+    }
+}
+
+TEST(BitRows, WhatTwoReachAtOnceGoesToTheFirst) {
+    SeededRandom random(8);
+    for (int round = 0; round < 100; ++round) {
+        const int width = 1 + static_cast<int>(random.below(64));
+        const int height = 1 + static_cast<int>(random.below(64));
+        const int steps = static_cast<int>(random.below(9));
+        BitRows own = random_rows(random, width, height, 0.01);
+        BitRows others = random_rows(random, width, height, 0.01);
+        for (std::size_t y = 0; y < 64; ++y) others[y] &= ~own[y];
+        BitRows shared = others;
+        share_out(own, shared, steps, width, height);
+        for (int step = 0; step < steps; ++step) {
+            const BitRows ours = own;
+            const BitRows theirs = others;
+            const auto grow = step % 2 == 0 ? grow_cross : grow_square;
+            grow(own, height);
+            grow(others, height);
+            for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
+                own[y] &= ~theirs[y] & row_mask(width);
+                others[y] &= ~(ours[y] | own[y]) & row_mask(width);
+            }
+        }
+        for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) ASSERT_EQ(shared[y], others[y]);
+    }
+}
+
+TEST(BitRows, AStackIsConnectedWithoutHoles) {
+    BitRows rows{};
+    rows[3] = 0b00111000U;
+    rows[4] = 0b11000000U;  // touches diagonally
+    rows[5] = 0b01100000U;
+    EXPECT_TRUE(is_one_stack(rows, 3, 6));
+    EXPECT_FALSE(is_one_stack(rows, 3, 7));  // an empty row
+    rows[5] = 0b00011000U;
+    EXPECT_FALSE(is_one_stack(rows, 3, 6));  // apart
+    rows[5] = 0b11010000U;
+    EXPECT_FALSE(is_one_stack(rows, 3, 6));  // two runs
+}
+
+TEST(BitRows, TheBoxHoldsAllBitsAndNoMore) {
+    BitRows rows{};
+    const BitBox none = box_of(rows, 0, 64);
+    EXPECT_EQ(none.top, none.bottom);
+    rows[5] = 0b0110U;
+    rows[9] = std::uint64_t{1} << 63;
+    const BitBox box = box_of(rows, 0, 64);
+    EXPECT_EQ(box.left, 1);
+    EXPECT_EQ(box.top, 5);
+    EXPECT_EQ(box.right, 64);
+    EXPECT_EQ(box.bottom, 10);
+    const BitBox wide = widened(box, 3, 64, 11);
+    EXPECT_EQ(wide.left, 0);
+    EXPECT_EQ(wide.top, 2);
+    EXPECT_EQ(wide.right, 64);
+    EXPECT_EQ(wide.bottom, 11);
+}
+
 // Repeats single steps until nothing changes: slow and plainly right.
 BitRows plain_flood(BitRows seed, const BitRows& allowed, int height) {
     for (std::size_t y = 0; y < 64; ++y) seed[y] &= allowed[y];

@@ -14,11 +14,11 @@ using namespace rig;
 using test::SeededRandom;
 
 struct Tables {
-    std::vector<std::uint32_t> parents = std::vector<std::uint32_t>(4096);
-    std::vector<std::uint32_t> areas = std::vector<std::uint32_t>(4096);
+    std::vector<ComponentLabel> labels = std::vector<ComponentLabel>(4096);
+    std::vector<std::uint16_t> label_of = std::vector<std::uint16_t>(4096);
     std::vector<Run> grouped = std::vector<Run>(4096);
     std::vector<Component> components = std::vector<Component>(512);
-    ComponentStorage storage() { return {parents, areas, grouped, components}; }
+    ComponentStorage storage() { return {labels, label_of, grouped, components}; }
 };
 
 std::vector<Run> runs_of(const std::vector<std::string>& rows) {

@@ -91,6 +91,7 @@ TEST(HiddenPart, MarksWhatIsBeyondTheSkinAndOneStepAround) {
     w->width = 32;
     w->height = 32;
     w->blob = box(10, 10, 20, 20);
+    w->box = {10, 10, 20, 20};
     for (std::size_t y = 0; y < 32; ++y)
         for (std::size_t x = 0; x < 32; ++x)
             w->cover[y][x] = y >= 10 && y < 20 && x >= 10 && x < 20 ? 256 : 0;
@@ -99,7 +100,7 @@ TEST(HiddenPart, MarksWhatIsBeyondTheSkinAndOneStepAround) {
     w->cover[12][19] = -200;
     w->cover[28][28] = -200;  // far from the blob
     ASSERT_TRUE(mark_hidden(*w, 0.02, hidden));
-    EXPECT_EQ(count_bits(hidden, 32), 9);
+    EXPECT_EQ(count_bits(hidden, 0, 32), 9);
     EXPECT_EQ(hidden[12], bit_span(18, 21));
     EXPECT_FALSE(mark_hidden(*w, 0.3, hidden));  // noise reaches as far
 }

@@ -98,7 +98,27 @@ TEST(Kernels, SlidingExtremesEqualThePlainSearch) {
     }
 }
 
-TEST(Kernels, RunsAreExactlyThePixelsBeyondTheThreshold) {
+TEST(Kernels, LevelsMoveAwayFromTheBackgroundByTheGreaterStep) {
+    SeededRandom random(12);
+    for (const int blocks : {1, 7, 16, 300}) {
+        for (const Side side : {Side::kBelow, Side::kAbove}) {
+            std::vector<std::uint8_t> levels(static_cast<std::size_t>(blocks));
+            for (std::uint8_t& level : levels) level = static_cast<std::uint8_t>(random.bits());
+            const std::vector<std::uint8_t> before = levels;
+            const int least = static_cast<int>(random.below(256));
+            const int part = static_cast<int>(random.below(257));
+            step_levels({levels, blocks, 1}, side, least, part);
+            for (std::size_t i = 0; i < levels.size(); ++i) {
+                const int step = std::max(least, before[i] * part >> 8);
+                const int expected =
+                    side == Side::kBelow ? std::max(0, before[i] - step) : std::min(250, before[i] + step);
+                ASSERT_EQ(levels[i], expected);
+            }
+        }
+    }
+}
+
+TEST(Kernels, RunsAreExactlyThePixelsBeyondTheThresholdThatHaveNeighbours) {
     SeededRandom random(3);
     for (const Size size : kSizes) {
         for (const Side side : {Side::kBelow, Side::kAbove}) {
@@ -119,12 +139,18 @@ TEST(Kernels, RunsAreExactlyThePixelsBeyondTheThreshold) {
                 for (int x = runs[i].begin; x < runs[i].end; ++x)
                     painted[static_cast<std::size_t>(runs[i].y * size.width + x)] = 1;
             }
+            const auto beyond = [&](int x, int y) {
+                if (x < 0 || y < 0 || x >= size.width || y >= size.height) return false;
+                const int level = levels.values[static_cast<std::size_t>(y / 4 * levels.width + x / 4)];
+                const int value = canvas.view.row(y)[x];
+                return side == Side::kBelow ? value < level : value > level;
+            };
             for (int y = 0; y < size.height; ++y) {
                 for (int x = 0; x < size.width; ++x) {
-                    const int level = levels.values[static_cast<std::size_t>(y / 4 * levels.width + x / 4)];
-                    const int value = canvas.view.row(y)[x];
-                    const bool beyond = side == Side::kBelow ? value < level : value > level;
-                    ASSERT_EQ(painted[static_cast<std::size_t>(y * size.width + x)] != 0, beyond)
+                    bool kept = false;
+                    for (int d = 0; d < 9; ++d) kept |= d != 4 && beyond(x + d % 3 - 1, y + d / 3 - 1);
+                    kept &= beyond(x, y);
+                    ASSERT_EQ(painted[static_cast<std::size_t>(y * size.width + x)] != 0, kept)
                         << x << " " << y;
                 }
             }
