@@ -10,7 +10,6 @@ namespace rig {
 
 namespace {
 
-constexpr double kHeadCentreMm = 80.0;      // behind the middle of the face: normals point away from it
 constexpr double kSamePlaceMm = 1.0;        // of a sighting from frame to frame
 constexpr double kAstrayLearning = 0.05;    // per frame
 constexpr double kDepthInformation = 1e-3;  // 1/mm^2 of the expected place, along a single ray
@@ -27,65 +26,37 @@ std::uint16_t one_more(std::uint16_t ticks) {
     return ticks < kMostTicks ? static_cast<std::uint16_t>(ticks + 1) : ticks;
 }
 
-// Of the surface that a marker and its neighbours lie on, face frame; length irrelevant, zero when they lie
-// on a line.
-Vec3 normal_at(const ShapeModel& model, const Topology& topology, std::size_t k) {
-    Vec3 middle = Vec3::Zero();
-    for (std::size_t i = 0; i < model.marker_count; ++i) middle += model.mean_mm[i];
-    middle /= static_cast<double>(model.marker_count);
-    middle[2] -= kHeadCentreMm;
-    const Vec3 out = model.mean_mm[k] - middle;
-    Vec3 normal = Vec3::Zero();
-    for (std::size_t a = 0; a < kNeighbours; ++a) {
-        for (std::size_t b = a + 1; b < kNeighbours; ++b) {
-            const Vec3 first = model.mean_mm[topology.nearest[k][a]] - model.mean_mm[k];
-            const Vec3 second = model.mean_mm[topology.nearest[k][b]] - model.mean_mm[k];
-            const Vec3 across = first.cross(second);
-            normal += across.dot(out) < 0.0 ? Vec3{-across} : across;
-        }
-    }
-    return normal;
-}
-
-bool faces_a_view(const ShapeModel& model, const Topology& topology, double least_cosine,
-                  const WatchedFrame& frame, std::size_t k) {
+bool faces_a_view(const Topology& topology, double least_cosine, const WatchedFrame& frame, std::size_t k) {
     if (!frame.sightings.from_cameras) return true;
-    const Vec3 normal = frame.fit.pose.rotation * normal_at(model, topology, k);
+    const Vec3 normal = frame.fit.pose.rotation * topology.normal[k];
     for (std::size_t view = 0; view < frame.sightings.view_count; ++view) {
         const ViewSightings& seen = frame.sightings.views[view];
         if (seen.empty()) continue;
         const Vec3 to_camera = seen[0].point_mm - frame.expected_mm[k];
         const double along = normal.dot(to_camera);
-        const double squared = normal.dot(normal) * to_camera.dot(to_camera);
+        const double squared = to_camera.dot(to_camera);
         if (along > 0.0 && along * along >= least_cosine * least_cosine * squared) return true;
     }
     return false;
 }
 
-bool should_be_seen(const ShapeModel& model, const Topology& topology, double least_cosine,
-                    const WatchedFrame& frame, std::size_t k) {
+bool should_be_seen(const Topology& topology, double least_cosine, const WatchedFrame& frame, std::size_t k) {
     std::size_t seen = 0;
     for (const std::uint16_t neighbour : topology.nearest[k])
         seen += frame.named.markers[neighbour].seen ? 1U : 0U;
-    return seen >= kSeenNeighbours && faces_a_view(model, topology, least_cosine, frame, k);
-}
-
-bool is_named(const ShapeModel& model, const std::array<std::int16_t, kMaxMarkers>& matches, std::size_t j) {
-    const auto end = matches.begin() + model.marker_count;
-    return std::find(matches.begin(), end, static_cast<std::int16_t>(j)) != end;
+    return seen >= kSeenNeighbours && faces_a_view(topology, least_cosine, frame, k);
 }
 
 // What stands near an unseen marker's place without a name, in every view; false: nothing.
-bool find_astray(const ShapeModel& model, double reach_mm, const WatchedFrame& frame, std::size_t k,
-                 Vec3& position_mm) {
+bool find_astray(double reach_mm, const WatchedFrame& frame, std::size_t k, Vec3& position_mm) {
     MarkerSightings mine;
     for (std::size_t view = 0; view < frame.sightings.view_count; ++view) {
         const ViewSightings& seen = frame.sightings.views[view];
         double nearest = reach_mm * reach_mm;
         std::size_t at = seen.size();
-        for (std::size_t j = 0; j < seen.size(); ++j) {
+        for (const std::uint16_t j : frame.left_over[view]) {
             const double d2 = seen[j].squared_distance_mm2(frame.expected_mm[k]);
-            if (d2 >= nearest || is_named(model, frame.matches[view], j)) continue;
+            if (d2 >= nearest) continue;
             nearest = d2;
             at = j;
         }
@@ -99,16 +70,15 @@ bool find_astray(const ShapeModel& model, double reach_mm, const WatchedFrame& f
     return point.gap_mm <= kSamePlaceMm;
 }
 
-void watch_unseen(const ShapeModel& model, const Topology& topology, const MarkerWatchConfig& config,
-                  const WatchedFrame& frame, std::size_t k, std::span<Vec3> bias_mm,
-                  MarkerWatchState& state) {
-    if (should_be_seen(model, topology, config.facing_cosine, frame, k))
+void watch_unseen(const Topology& topology, const MarkerWatchConfig& config, const WatchedFrame& frame,
+                  std::size_t k, std::span<Vec3> bias_mm, MarkerWatchState& state) {
+    if (should_be_seen(topology, config.facing_cosine, frame, k))
         state.absent_ticks[k] = one_more(state.absent_ticks[k]);
     if (state.absent_ticks[k] >= ticks_of(config.fallen_s, config.rate_hz))
         state.trouble[k] = MarkerTrouble::kFallen;
     Vec3 position_mm = Vec3::Zero();
     std::uint16_t& ticks = state.astray_ticks[k];
-    if (!find_astray(model, config.astray_mm, frame, k, position_mm)) {
+    if (!find_astray(config.astray_mm, frame, k, position_mm)) {
         if (ticks > 0) --ticks;
         return;
     }
@@ -165,7 +135,7 @@ void watch_markers(const ShapeModel& model, const Topology& topology, const Mark
     const bool counts = is_new_expression(model, config, frame.fit, state);
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         if (!frame.named.markers[k].seen) {
-            watch_unseen(model, topology, config, frame, k, bias_mm, state);
+            watch_unseen(topology, config, frame, k, bias_mm, state);
             continue;
         }
         state.absent_ticks[k] = 0;

@@ -24,9 +24,9 @@ struct MarkerWatchConfig {
     double fallen_s = 5.0;   // unseen although it should be seen
     double astray_s = 1.0;   // a sighting without a name keeps its place beside an unseen marker
     double astray_mm = 6.0;  // ... within this of it
-    // Off the face. The face bends after a marker that slid: of 3 mm a corner of the lips shows 1.5,
-    // others 2.1 and more (headrig experiment identity-troubles). Right ones stay within 0.05 on the public
-    // takes.
+    // Off the face, which bends after a marker that slid: 3 mm show as 1.8 and more, but for the corners of
+    // the lips, which it follows almost whole (headrig experiment identity-troubles). Right ones stay within
+    // 0.05 on the public takes.
     double slid_mm = 1.2;
     std::uint8_t slid_expressions = 10;  // ... in so many expressions more than it was not
     double new_expression = 1.0;         // distance of the coefficients from the last one that counted
@@ -46,7 +46,7 @@ struct MarkerWatchState {
 struct WatchedFrame {
     std::span<const Vec3> expected_mm;  // headset frame, learnt bias and all
     const SightingSet& sightings;
-    const Matches& matches;
+    const LeftOverSightings& left_over;
     const NamedMarkers& named;
     const ShapeFit& fit;
 };

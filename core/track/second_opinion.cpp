@@ -23,18 +23,9 @@ constexpr double kLeastGainMm2 = 0.5 * kNamingGateMm * kNamingGateMm;
 constexpr double kMostShare = 0.9;  // of what the present names leave
 
 bool left_over_beside_unseen(const ShapeModel& model, std::span<const Vec3> predicted_mm,
-                             const ViewSightings& seen,
+                             const ViewSightings& seen, std::span<const std::uint16_t> left_over,
                              const std::array<std::int16_t, kMaxMarkers>& matches) {
-    std::size_t named = 0;
-    std::array<bool, kMaxSightings> taken{};
-    for (std::size_t k = 0; k < model.marker_count; ++k) {
-        if (matches[k] < 0) continue;
-        taken[static_cast<std::size_t>(matches[k])] = true;
-        ++named;
-    }
-    if (named == seen.size() || named == model.marker_count) return false;
-    for (std::size_t j = 0; j < seen.size(); ++j) {
-        if (taken[j]) continue;
+    for (const std::uint16_t j : left_over) {
         for (std::size_t k = 0; k < model.marker_count; ++k) {
             if (matches[k] < 0 && seen[j].squared_distance_mm2(predicted_mm[k]) < kBesideMm * kBesideMm)
                 return true;
@@ -70,15 +61,18 @@ void ask_for_opinions(SecondOpinionState& state) {
 }
 
 void suspect(const ShapeModel& model, std::span<const Vec3> predicted_mm, const SightingSet& sightings,
-             const Matches& matches, bool odd, SecondOpinionState& state) {
+             const Matches& matches, const LeftOverSightings& left_over, bool odd,
+             SecondOpinionState& state) {
     if (state.pause > 0) {
         --state.pause;
         return;
     }
     if (state.left > 0) return;
     bool doubtful = odd;
-    for (std::size_t view = 0; view < sightings.view_count && !doubtful; ++view)
-        doubtful = left_over_beside_unseen(model, predicted_mm, sightings.views[view], matches[view]);
+    for (std::size_t view = 0; view < sightings.view_count && !doubtful; ++view) {
+        doubtful = left_over_beside_unseen(model, predicted_mm, sightings.views[view], left_over[view].span(),
+                                           matches[view]);
+    }
     if (!doubtful) {
         state.suspicion = static_cast<std::uint8_t>(std::max(0, state.suspicion - 1));
         if (state.next_pause > 0) --state.next_pause;

@@ -28,7 +28,7 @@ void ask_for_opinions(SecondOpinionState& state);
 // Of one frame and its final names. `odd`: something else about the names is wrong. Suspicion that lasts asks
 // for opinions; when they change nothing, ever more time passes before the next.
 void suspect(const ShapeModel& model, std::span<const Vec3> predicted_mm, const SightingSet& sightings,
-             const Matches& matches, bool odd, SecondOpinionState& state);
+             const Matches& matches, const LeftOverSightings& left_over, bool odd, SecondOpinionState& state);
 
 // One opinion (0..kOpinions - 1) on a frame's sightings and names, `fit` the face behind the names. True:
 // another naming leaves clearly less unexplained (naming_cost_mm2), by at least half a sighting; it is in

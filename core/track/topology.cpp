@@ -8,7 +8,8 @@ namespace rig {
 namespace {
 
 constexpr double kCertainSigmas = 4.0;
-constexpr double kLeastApartMm = 1.0;  // nearer markers are one dot to a camera
+constexpr double kHeadCentreMm = 80.0;  // behind the middle of the face: normals point away from it
+constexpr double kLeastApartMm = 1.0;   // nearer markers are one dot to a camera
 
 void find_nearest(const ShapeModel& model, Topology& topology) {
     for (std::size_t k = 0; k < model.marker_count; ++k) {
@@ -29,6 +30,30 @@ void find_nearest(const ShapeModel& model, Topology& topology) {
             nearest[at] = static_cast<std::uint16_t>(other);
         }
     }
+}
+
+Vec3 normal_at(const ShapeModel& model, const Topology& topology, std::size_t k, const Vec3& inside_mm) {
+    const Vec3 out = model.mean_mm[k] - inside_mm;
+    Vec3 normal = Vec3::Zero();
+    for (std::size_t a = 0; a < kNeighbours; ++a) {
+        for (std::size_t b = a + 1; b < kNeighbours; ++b) {
+            const Vec3 first = model.mean_mm[topology.nearest[k][a]] - model.mean_mm[k];
+            const Vec3 second = model.mean_mm[topology.nearest[k][b]] - model.mean_mm[k];
+            const Vec3 across = first.cross(second);
+            normal += across.dot(out) < 0.0 ? Vec3{-across} : across;
+        }
+    }
+    const double length = std::sqrt(normal.dot(normal));
+    return length > 1e-9 ? Vec3{normal / length} : Vec3{Vec3::Zero()};
+}
+
+void find_normals(const ShapeModel& model, Topology& topology) {
+    Vec3 inside = Vec3::Zero();
+    for (std::size_t k = 0; k < model.marker_count; ++k) inside += model.mean_mm[k];
+    inside /= static_cast<double>(model.marker_count);
+    inside[2] -= kHeadCentreMm;
+    for (std::size_t k = 0; k < model.marker_count; ++k)
+        topology.normal[k] = normal_at(model, topology, k, inside);
 }
 
 bool is_nearest(const Topology& topology, std::size_t of, std::size_t marker) {
@@ -53,6 +78,7 @@ void build_topology(const ShapeModel& model, Topology& topology) {
     topology.pairs.clear();
     if (model.marker_count <= kNeighbours) return;
     find_nearest(model, topology);
+    find_normals(model, topology);
     for (std::size_t a = 0; a < model.marker_count; ++a) {
         for (std::size_t b = a + 1; b < model.marker_count; ++b) {
             if (!is_nearest(topology, a, b) && !is_nearest(topology, b, a)) continue;

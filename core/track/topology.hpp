@@ -25,8 +25,11 @@ struct NeighbourPair {
 // nothing. kMaxMarkers * kNeighbours of them at most.
 struct Topology {
     BoundedVector<NeighbourPair, kMaxMarkers * kNeighbours> pairs;
-    std::array<std::array<std::uint16_t, kNeighbours>, kMaxMarkers>
-        nearest{};  // of each marker, nearest first
+    // Of each marker, nearest first.
+    std::array<std::array<std::uint16_t, kNeighbours>, kMaxMarkers> nearest{};
+    // Of the surface through a marker and its nearest, outwards; unit, face frame; zero when they lie on a
+    // line.
+    std::array<Vec3, kMaxMarkers> normal{};
 };
 
 // Precondition: more than kNeighbours markers, else no pairs.

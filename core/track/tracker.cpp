@@ -173,7 +173,7 @@ void watch(const ShapeModel& model, const TrackerConfig& config, const SightingS
     MarkerWatchConfig watched = config.watch;
     watched.rate_hz = config.rate_hz;
     watch_markers(model, state.topology, watched,
-                  {predicted(model, w), sightings, w.matches, named, state.fit}, config.neutral_offset_mm,
+                  {predicted(model, w), sightings, w.left_over, named, state.fit}, config.neutral_offset_mm,
                   {state.bias_mm.data(), model.marker_count}, state.watch);
     report.trouble = state.watch.trouble;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
@@ -335,8 +335,9 @@ void track(const ShapeModel& model, const TrackerConfig& config, const SightingS
     count_changes(model, sightings, w.first_matches, w.matches, report);
     predict_face(model, state, w);
     const double ratio = remember(model, named, w, state, report);
+    find_left_over(model.marker_count, sightings, w.matches, w.left_over);
     const bool odd = report.rejected > 0 || ratio > config.suspicious_ratio;
-    suspect(model, predicted(model, w), sightings, w.matches, odd, state.opinion);
+    suspect(model, predicted(model, w), sightings, w.matches, w.left_over, odd, state.opinion);
     watch(model, config, sightings, named, state, w, report);
     state.capture_us = sightings.capture_us;
     report.matches = w.matches;
@@ -391,6 +392,7 @@ void check_names(const ShapeModel& model, const TrackerConfig& config, std::span
     reject_broken_order(model, state, named, w, report);
     predict_face(model, state, w);
     remember(model, named, w, state, report);
+    find_left_over(model.marker_count, scratch, w.matches, w.left_over);
     watch(model, config, scratch, named, state, w, report);
     report.matches = w.matches;
     notice_loss(model, config, state, report);

@@ -74,6 +74,7 @@ struct TrackerWorkspace {
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> informations{};
     std::array<bool, kMaxMarkers> broken{};  // order among neighbours
+    LeftOverSightings left_over;             // of the final names
 };
 
 struct TrackerReport {

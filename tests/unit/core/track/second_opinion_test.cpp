@@ -87,8 +87,10 @@ TEST(SecondOpinion, WhatIsHiddenLeavesNothingToFind) {
 // Frames until opinions are asked for, 0 when not within `frames`.
 int frames_until_asked(const Scene& s, const Matches& names, bool odd, int frames,
                        SecondOpinionState& state) {
+    LeftOverSightings left_over;
+    find_left_over(60, *s.sightings, names, left_over);
     for (int i = 1; i <= frames; ++i) {
-        suspect(*s.model, s.truth, *s.sightings, names, odd, state);
+        suspect(*s.model, s.truth, *s.sightings, names, left_over, odd, state);
         if (state.left > 0) return i;
     }
     return 0;

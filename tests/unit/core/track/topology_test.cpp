@@ -45,6 +45,14 @@ TEST(Topology, NearestAreTheNearestOfTheMeanFace) {
     }
 }
 
+TEST(Topology, NormalsPointOutOfTheFace) {
+    const Scene s(60);
+    for (std::size_t k = 0; k < 60; ++k) {
+        EXPECT_NEAR(s.topology->normal[k].norm(), 1.0, 1e-12);
+        EXPECT_GT(s.topology->normal[k].dot(s.face.outward(k)), 0.8) << k;
+    }
+}
+
 TEST(Topology, ExpressionsAndSlipsBreakNoOrder) {
     for (const std::size_t markers : {30U, 60U, 102U}) {
         Scene s(markers);
