@@ -13,6 +13,7 @@
 #include "core/geometry/pnp.hpp"
 #include "core/image/view.hpp"
 #include "core/stabilise/neutral_capture.hpp"
+#include "core/track/marker_watch.hpp"
 
 namespace rig {
 
@@ -81,6 +82,9 @@ struct FrameReport {
     std::uint16_t swaps_repaired = 0;
     std::uint16_t names_rejected = 0;
     bool bootstrapped = false;  // identities were found anew in this frame
+    // markers that came off or slid (F18), while the face is tracked; [marker_count]
+    std::array<MarkerTrouble, kMaxMarkers> marker_trouble{};
+    std::array<float, kMaxMarkers> marker_off_mm{};  // of a slid one: how far it stands off its place
     std::array<std::int16_t, kMaxPoints>
         labels{};  // PointFrame input: the marker each point was taken for, -1 none
     // how each camera sits on the helmet, by the pack's reference marks; nothing measured without them

@@ -153,6 +153,8 @@ void Pipeline::forget_neutral() {
 void Pipeline::reset_tracking() {
     window_ticks_ = 0;
     stabilised_ = StabiliserOutput{};
+    for (Detector& each : detectors_) each.reset();
+    mounts_.fill(MountDriftState{});
     reset_tracker(tracker_);
     reset_stabiliser(stabiliser_);
     reset_solver(solver_);
@@ -217,6 +219,7 @@ void Pipeline::take_observations(std::size_t camera, std::span<const Observation
 }
 
 void Pipeline::track_sightings(FrameReport& report) {
+    expect_neutral();
     track(model_, tracker_config_, sightings_, tracker_, tracker_workspace_, named_, track_report_);
     // From here on a match is an observation: some of those became no sighting.
     for (std::size_t view = 0; sightings_.from_cameras && view < sightings_.view_count; ++view) {
@@ -225,10 +228,21 @@ void Pipeline::track_sightings(FrameReport& report) {
                 match = static_cast<std::int16_t>(sightings_.source[view][static_cast<std::size_t>(match)]);
         }
     }
+    report_identity(report);
+    report.bootstrapped = track_report_.bootstrapped;
+}
+
+void Pipeline::report_identity(FrameReport& report) const {
     report.markers_seen = track_report_.seen;
     report.swaps_repaired = track_report_.swaps_repaired;
     report.names_rejected = track_report_.rejected;
-    report.bootstrapped = track_report_.bootstrapped;
+    report.marker_trouble = track_report_.trouble;
+    report.marker_off_mm = track_report_.off_mm;
+}
+
+// Dots that were glued aside before the neutral was taken have not slid.
+void Pipeline::expect_neutral() {
+    tracker_config_.neutral_offset_mm = std::span<const Vec3>(neutral_.offset_mm).first(pack_.marker_count);
 }
 
 void Pipeline::step(const FrameSet& frame, FaceState& state, FrameReport& report) {
@@ -280,11 +294,10 @@ void Pipeline::step(const LabelledFrame& frame, FaceState& state, FrameReport& r
     begin(frame.capture_us, state, report);
     bool usable = configured_ && frame.positions_mm.size() == pack_.marker_count;
     if (usable) {
+        expect_neutral();
         check_names(model_, tracker_config_, frame.positions_mm, static_cast<double>(pack_.noise_mm),
                     tracker_, tracker_workspace_, sightings_, named_, track_report_);
-        report.markers_seen = track_report_.seen;
-        report.swaps_repaired = track_report_.swaps_repaired;
-        report.names_rejected = track_report_.rejected;
+        report_identity(report);
         usable = track_report_.seen >= kMinMarkers;
     }
     if (usable) solve_named(frame.capture_us, report);
@@ -462,6 +475,7 @@ void Pipeline::raise_faults(bool usable, const FrameReport& report, FaceState& s
     if (!usable) return;
     raise(state.state == TrackingState::kPartial, Fault::kMarkersMissing);
     raise(report.swaps_repaired > 0 || report.names_rejected > 0, Fault::kMarkerSwap);
+    raise(track_report_.fallen + track_report_.slid > 0, Fault::kMarkerDrift);
     raise(!report.optimal, Fault::kSolveWeak);
     raise(config_.camera_on_head && (stabiliser_report_.slip_rotation_rad > kSlipAlarmRad ||
                                      stabiliser_report_.slip_translation_mm > kSlipAlarmMm),

@@ -51,7 +51,9 @@ class Pipeline {
     // configure().
     [[nodiscard]] Result<void, ControlError> set_controls(const ControlSet& controls);
 
-    // Forgets identities, slip and the temporal prior; the next frames find them anew.
+    // Forgets all that was learnt from frames: identities, slip, the temporal prior, the dots' polarity, size
+    // and usual light, how the cameras sit. The next frames find it anew, as after configure(). What somebody
+    // chose stays: the neutral and the controls.
     void reset_tracking();
 
     // "Basis": the next second of the face at rest becomes the neutral, as an offset of each marker; the
@@ -80,6 +82,8 @@ class Pipeline {
     void take_observations(std::size_t camera, std::span<const Observation> observations,
                            FrameReport& report);
     void track_sightings(FrameReport& report);
+    void report_identity(FrameReport& report) const;
+    void expect_neutral();
     void find_head_pose(FrameReport& report);
     void solve_named(std::int64_t capture_us, FrameReport& report);
     void finish(std::int64_t capture_us, bool usable, FaceState& state, FrameReport& report);

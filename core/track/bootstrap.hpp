@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "core/geometry/shape_model.hpp"
-#include "core/track/matching.hpp"
+#include "core/track/naming_rounds.hpp"
 #include "core/track/pose_votes.hpp"
 
 namespace rig {
@@ -37,18 +37,10 @@ struct BootstrapStart {
 };
 
 struct BootstrapWorkspace {
-    MatchingWorkspace matching;
-    ShapeFitWorkspace fit;
+    NamingWorkspace naming;
     PoseVotesWorkspace votes;
     BoundedVector<PoseCandidate, kPoseCandidates> candidates;
-    ShapeModel coarse;  // the leading modes alone
     BoundedVector<BootstrapStart, kPoseCandidates> starts;
-    Matches matches{};
-    NamedMarkers named;
-    ShapeFit trial;
-    std::array<Vec3, kMaxMarkers> predicted_mm{};
-    std::array<Vec3, kMaxMarkers> positions_mm{};
-    std::array<Mat3, kMaxMarkers> informations{};
 };
 
 struct BootstrapReport {

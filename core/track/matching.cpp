@@ -278,6 +278,27 @@ void assign_group(std::size_t leader, std::size_t markers, double gate_mm, Match
 
 }  // namespace
 
+void find_left_over(std::size_t marker_count, const SightingSet& sightings, const Matches& matches,
+                    LeftOverSightings& left_over) {
+    for (std::size_t view = 0; view < sightings.view_count; ++view) {
+        left_over[view].clear();
+        const std::size_t count = sightings.views[view].size();
+        std::array<std::uint64_t, (kMaxSightings + 63) / 64> named{};
+        std::size_t names = 0;
+        for (std::size_t k = 0; k < marker_count; ++k) {
+            if (matches[view][k] < 0) continue;
+            const auto j = static_cast<std::size_t>(matches[view][k]);
+            named[j / 64] |= std::uint64_t{1} << (j % 64);
+            ++names;
+        }
+        for (std::size_t j = 0; j < count && names < count; ++j) {
+            if ((named[j / 64] >> (j % 64) & 1U) != 0) continue;
+            const bool kept = left_over[view].push_back(static_cast<std::uint16_t>(j));
+            RIG_CHECK(kept);
+        }
+    }
+}
+
 void match_views(std::span<const Vec3> predicted_mm, const SightingSet& sightings, double gate_mm,
                  MatchingWorkspace& workspace, Matches& matches, std::span<const Vec3> velocity_mm_per_us) {
     RIG_CHECK(velocity_mm_per_us.empty() || velocity_mm_per_us.size() == predicted_mm.size());

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/base/bounded_vector.hpp"
 #include "core/geometry/shape_fit.hpp"
 #include "core/track/assignment.hpp"
 #include "core/track/named_markers.hpp"
@@ -51,6 +52,11 @@ struct MatchingWorkspace {
     std::array<double, kMaxMarkers * kMaxSightings> cost{};
     AssignmentWorkspace assignment;
 };
+
+// Sightings of each view that no marker was given, rising.
+using LeftOverSightings = std::array<BoundedVector<std::uint16_t, kMaxSightings>, kMaxCameras>;
+void find_left_over(std::size_t marker_count, const SightingSet& sightings, const Matches& matches,
+                    LeftOverSightings& left_over);
 
 // Optimal assignment per view, cost = squared distance of the prediction from the ray or point, nothing
 // beyond the gate. Groups of markers without a common sighting are assigned apart: the same optimum.

@@ -14,6 +14,15 @@ constexpr double kCellMm = 4.0;
 constexpr double kMostRotationSteps = 6.0;  // to either side of an axis
 constexpr std::size_t kDepths = 3;
 
+// A face gives a cell some hundred votes. Dots that all lie in one place could give more than 16 bits hold
+// (every marker times every sighting of every camera): the count stands still there.
+constexpr std::uint16_t kMostVotes = 65535;
+static_assert(kMaxMarkers * kMaxSightings * kMaxCameras > kMostVotes);
+
+void add_vote(std::uint16_t& cell) {
+    cell = static_cast<std::uint16_t>(cell + (cell != kMostVotes ? 1U : 0U));
+}
+
 using Workspace = PoseVotesWorkspace;
 using Candidates = BoundedVector<PoseCandidate, kPoseCandidates>;
 
@@ -68,8 +77,9 @@ void vote_points(const Grid& grid, std::size_t markers, const ViewSightings& see
             if (!(y >= 0.0 && y < count)) continue;
             const double z = (sighting.point_mm[2] - corner[2]) * per_mm;
             if (!(z >= 0.0 && z < count)) continue;
-            ++w.votes[(static_cast<std::size_t>(z) * grid.count + static_cast<std::size_t>(y)) * grid.count +
-                      static_cast<std::size_t>(x)];
+            add_vote(w.votes[(static_cast<std::size_t>(z) * grid.count + static_cast<std::size_t>(y)) *
+                                 grid.count +
+                             static_cast<std::size_t>(x)]);
         }
     }
 }
@@ -93,7 +103,7 @@ void vote_rays(const Grid& grid, std::size_t markers, const ViewSightings& seen,
             if (!(x >= 0.0 && x < count)) continue;
             const double y = (y_mm + marker[2] * y_slope - marker[1]) * per_mm;
             if (!(y >= 0.0 && y < count)) continue;
-            ++w.votes[static_cast<std::size_t>(y) * grid.count + static_cast<std::size_t>(x)];
+            add_vote(w.votes[static_cast<std::size_t>(y) * grid.count + static_cast<std::size_t>(x)]);
         }
     }
 }
@@ -106,7 +116,8 @@ void sum_along(const Grid& grid, std::size_t stride, std::span<const std::uint16
         const std::size_t end = start + line - stride;
         for (std::size_t i = start; i < start + stride; ++i) to[i] = 0;
         for (std::size_t i = start + stride; i < end; ++i)
-            to[i] = static_cast<std::uint16_t>(from[i - stride] + from[i] + from[i + stride]);
+            to[i] = static_cast<std::uint16_t>(std::min<std::uint32_t>(
+                kMostVotes, std::uint32_t{from[i - stride]} + from[i] + from[i + stride]));
         for (std::size_t i = end; i < end + stride; ++i) to[i] = 0;
     }
 }
@@ -116,7 +127,7 @@ Vec3 peak_of(const Grid& grid, Workspace& w, std::uint32_t& votes) {
     const std::size_t cells = grid.cells();
     const std::span<std::uint16_t> raw(w.votes.data(), cells);
     const std::span<std::uint16_t> sums(w.summed.data(), cells);
-    // The raw votes are kept in place by summing back and forth: counts stay small enough for 16 bits.
+    // Summed back and forth between the two grids.
     sum_along(grid, 1, raw, sums);
     sum_along(grid, grid.count, sums, raw);
     std::span<const std::uint16_t> result = raw;

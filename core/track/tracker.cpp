@@ -82,6 +82,7 @@ void fit_face(const ShapeModel& model, const TrackerConfig& config, TrackerState
         const NamedMarker& marker = named.markers[k];
         w.positions_mm[k] = marker.position_mm - state.bias_mm[k];
         w.informations[k] = marker.seen ? marker.information : Mat3{Mat3::Zero()};
+        if (state.watch.trouble[k] == MarkerTrouble::kSlid) w.informations[k] *= kSlidTrust;
     }
     const std::span<const Vec3> positions(w.positions_mm.data(), model.marker_count);
     const std::span<const Mat3> informations(w.informations.data(), model.marker_count);
@@ -102,20 +103,44 @@ void fit_face(const ShapeModel& model, const TrackerConfig& config, TrackerState
     fit_shape(model, positions, informations, prior, kFitLimits, before, state.memory, w.fit, w.next);
 }
 
+void withhold(std::size_t k, NamedMarkers& named, TrackerWorkspace& w) {
+    named.markers[k] = NamedMarker{};
+    for (auto& view : w.matches) view[k] = -1;
+}
+
+// Who comes back a little off waits a frame, who had come off the face half a second.
+void hold_returns(const ShapeModel& model, const TrackerConfig& config, TrackerState& state,
+                  NamedMarkers& named, TrackerWorkspace& w) {
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        std::uint8_t& waited = state.returning[k];
+        if (!named.markers[k].seen || state.missed[k] == 0) {
+            waited = 0;
+            continue;
+        }
+        int needed = residual_of(w, state, named, k) > config.return_mm ? 1 : 0;
+        if (state.watch.trouble[k] == MarkerTrouble::kFallen) needed = config.fallen_return_frames;
+        if (waited >= needed) continue;
+        ++waited;
+        withhold(k, named, w);
+    }
+}
+
 // Names that do not lie on the fitted face are taken back.
 void reject_outliers(const ShapeModel& model, const TrackerConfig& config, const TrackerState& state,
                      NamedMarkers& named, TrackerWorkspace& w, TrackerReport& report) {
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         if (!named.markers[k].seen || residual_of(w, state, named, k) <= config.outlier_mm) continue;
-        named.markers[k] = NamedMarker{};
-        for (auto& view : w.matches) view[k] = -1;
+        withhold(k, named, w);
         ++report.rejected;
     }
 }
 
-void remember(const ShapeModel& model, const NamedMarkers& named, const TrackerWorkspace& w,
-              TrackerState& state, TrackerReport& report) {
+// Returns how far the markers stand off the face, in the variances of what was measured.
+double remember(const ShapeModel& model, const NamedMarkers& named, const TrackerWorkspace& w,
+                TrackerState& state, TrackerReport& report) {
     double sum = 0.0;
+    double off_sum = 0.0;
+    double dimensions = 0.0;
     report.seen = 0;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         const NamedMarker& marker = named.markers[k];
@@ -130,11 +155,35 @@ void remember(const ShapeModel& model, const NamedMarkers& named, const TrackerW
         state.missed[k] = 0;
         const Vec3 off = marker.position_mm - w.fit.headset_mm[k];
         sum += (off - state.bias_mm[k]).squaredNorm();
+        // What was learnt of a wrong name would hide it here.
+        const Vec3 weighted = marker.information * off;
+        off_sum += off.dot(weighted);
+        dimensions += marker.views == 1 ? 2.0 : 3.0;
         state.bias_mm[k] += kBiasLearning * (off - state.bias_mm[k]);
         ++report.seen;
     }
     state.fit = w.next;
     report.residual_mm = report.seen == 0 ? 0.0 : std::sqrt(sum / report.seen);
+    return dimensions > 0.0 ? off_sum / dimensions : 0.0;
+}
+
+// Fallen and slid markers; what a slid one says counts less from here on.
+void watch(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings,
+           NamedMarkers& named, TrackerState& state, TrackerWorkspace& w, TrackerReport& report) {
+    MarkerWatchConfig watched = config.watch;
+    watched.rate_hz = config.rate_hz;
+    watch_markers(model, state.topology, watched,
+                  {predicted(model, w), sightings, w.left_over, named, state.fit}, config.neutral_offset_mm,
+                  {state.bias_mm.data(), model.marker_count}, state.watch);
+    report.trouble = state.watch.trouble;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        if (state.watch.trouble[k] == MarkerTrouble::kFallen) ++report.fallen;
+        if (state.watch.trouble[k] != MarkerTrouble::kSlid) continue;
+        ++report.slid;
+        report.off_mm[k] = static_cast<float>(
+            off_its_place_mm(state.fit.pose, config.neutral_offset_mm, state.bias_mm[k], k));
+        named.markers[k].information *= kSlidTrust;
+    }
 }
 
 void count_changes(const ShapeModel& model, const SightingSet& sightings, const Matches& before,
@@ -170,9 +219,65 @@ void begin_tracking(const ShapeModel& model, const ShapeFit& fit, TrackerState& 
     state.bootstrap = starts;
     state.fit = fit;
     state.tracking = true;
+    build_topology(model, state.topology);
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         state.missed[k] = 1;
         state.position_mm[k] = fit.headset_position(model, k);
+    }
+}
+
+// Names from motion, the face from the names, and names again from the face, which does not know who was who.
+void name_sightings(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings,
+                    TrackerState& state, TrackerWorkspace& w, NamedMarkers& named) {
+    predict_motion(model, config, state, w);
+    std::span<const Vec3> velocity = row_velocity(model, config, sightings, state, nullptr, w);
+    match_views(predicted(model, w), sightings, config.first_gate_mm, w.matching, w.matches, velocity);
+    w.first_matches = w.matches;
+    combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
+    fit_face(model, config, state, named, w);
+
+    predict_face(model, state, w);
+    velocity = row_velocity(model, config, sightings, state, &w.next, w);
+    match_views(predicted(model, w), sightings, config.final_gate_mm, w.matching, w.matches, velocity);
+    combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
+    // With a rolling shutter the positions have moved with the new velocities, whatever the names.
+    if (!velocity.empty() || !same_names(model, sightings, w.matches, w.fitted_matches)) {
+        fit_face(model, config, state, named, w);
+    }
+}
+
+// One opinion. When it is better the face starts from it, and markers that it names otherwise from nothing;
+// the others keep what is known of them.
+void hear_opinion(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings,
+                  TrackerState& state, TrackerWorkspace& w, NamedMarkers& named, TrackerReport& report) {
+    const auto opinion = static_cast<std::uint8_t>(kOpinions - state.opinion.left--);
+    NamingWorkspace& other = w.bootstrap.naming;
+    if (!second_opinion(model, w.next, sightings, w.matches, opinion, other)) return;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        bool changed = false;
+        for (std::size_t view = 0; view < sightings.view_count; ++view)
+            changed = changed || other.matches[view][k] != w.matches[view][k];
+        if (!changed) continue;
+        state.missed[k] = std::max<std::uint16_t>(state.missed[k], 1);
+        state.velocity_mm[k] = Vec3::Zero();
+        state.bias_mm[k] = Vec3::Zero();
+        ++report.reconsidered;
+    }
+    report.swaps_repaired = static_cast<std::uint16_t>(report.swaps_repaired + report.reconsidered);
+    state.fit = other.trial;
+    name_sightings(model, config, sightings, state, w, named);
+}
+
+// Of neighbours that have changed places one name at least is wrong: both wait until the face says which.
+void reject_broken_order(const ShapeModel& model, const TrackerState& state, NamedMarkers& named,
+                         TrackerWorkspace& w, TrackerReport& report) {
+    const Mat3 face_from_headset = w.next.pose.rotation.transpose();
+    report.order_broken = find_broken_order(state.topology, face_from_headset, named, w.broken);
+    if (report.order_broken == 0) return;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        if (!w.broken[k]) continue;
+        withhold(k, named, w);
+        ++report.rejected;
     }
 }
 
@@ -217,26 +322,23 @@ void track(const ShapeModel& model, const TrackerConfig& config, const SightingS
             return;
         }
         begin_tracking(model, found, state);
+        ask_for_opinions(state.opinion);
         report.bootstrapped = true;
     }
-    predict_motion(model, config, state, w);
-    std::span<const Vec3> velocity = row_velocity(model, config, sightings, state, nullptr, w);
-    match_views(predicted(model, w), sightings, config.first_gate_mm, w.matching, w.matches, velocity);
-    w.first_matches = w.matches;
-    combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
-    fit_face(model, config, state, named, w);
-
-    predict_face(model, state, w);
-    velocity = row_velocity(model, config, sightings, state, &w.next, w);
-    match_views(predicted(model, w), sightings, config.final_gate_mm, w.matching, w.matches, velocity);
-    combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
-    // With a rolling shutter the positions have moved with the new velocities, whatever the names.
-    if (!velocity.empty() || !same_names(model, sightings, w.matches, w.fitted_matches)) {
-        fit_face(model, config, state, named, w);
+    name_sightings(model, config, sightings, state, w, named);
+    if (state.opinion.left > 0 && !report.bootstrapped) {
+        hear_opinion(model, config, sightings, state, w, named, report);
     }
     reject_outliers(model, config, state, named, w, report);
+    if (!report.bootstrapped) hold_returns(model, config, state, named, w);
+    reject_broken_order(model, state, named, w, report);
     count_changes(model, sightings, w.first_matches, w.matches, report);
-    remember(model, named, w, state, report);
+    predict_face(model, state, w);
+    const double ratio = remember(model, named, w, state, report);
+    find_left_over(model.marker_count, sightings, w.matches, w.left_over);
+    const bool odd = report.rejected > 0 || ratio > config.suspicious_ratio;
+    suspect(model, predicted(model, w), sightings, w.matches, w.left_over, odd, state.opinion);
+    watch(model, config, sightings, named, state, w, report);
     state.capture_us = sightings.capture_us;
     report.matches = w.matches;
     notice_loss(model, config, state, report);
@@ -287,7 +389,11 @@ void check_names(const ShapeModel& model, const TrackerConfig& config, std::span
         reject_outliers(model, config, state, named, w, report);
         count_changes(model, scratch, w.first_matches, w.matches, report);
     }
+    reject_broken_order(model, state, named, w, report);
+    predict_face(model, state, w);
     remember(model, named, w, state, report);
+    find_left_over(model.marker_count, scratch, w.matches, w.left_over);
+    watch(model, config, scratch, named, state, w, report);
     report.matches = w.matches;
     notice_loss(model, config, state, report);
 }

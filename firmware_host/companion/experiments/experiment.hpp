@@ -51,6 +51,7 @@ struct Experiment {
 [[nodiscard]] Result<ExperimentTable, FileError> hybrid16_barycentric(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> identity_bootstrap(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> identity_swaps(const std::filesystem::path& data);
+[[nodiscard]] Result<ExperimentTable, FileError> identity_troubles(const std::filesystem::path& data);
 [[nodiscard]] Result<ExperimentTable, FileError> identity_unlabelled(const std::filesystem::path& data);
 // `data` may be "sample": the built-in head and its take.
 [[nodiscard]] Result<ExperimentTable, FileError> missing_markers(const std::filesystem::path& data);

@@ -24,6 +24,8 @@ std::span<const Experiment> all_experiments() {
         Experiment{"identity-swaps",
                    "Swapped names, labelled and in the tracker's memory, and how soon repaired",
                    identity_swaps},
+        Experiment{"identity-troubles", "Markers that come off or slide are flagged, and no others",
+                   identity_troubles},
         Experiment{"identity-unlabelled", "Names of both takes' unlabelled streams, from the first frame on",
                    identity_unlabelled},
         Experiment{"missing-markers", "Zhang06 section 10: where unseen markers are inferred to be",

@@ -136,6 +136,17 @@ InspectFigures figures_of(const TakeRecord& record) {
     return out;
 }
 
+std::string incident_text(const TakeRecord& record, const MarkerIncident& incident) {
+    const std::string& name = record.markers[incident.marker].name;
+    if (incident.trouble == MarkerTrouble::kFallen) {
+        return fmt::format("marker {} has come off (noticed at {:.2f} s): put a new dot there", name,
+                           incident.first_s);
+    }
+    return fmt::format(
+        "marker {} has slid by {:.1f} mm (noticed at {:.2f} s): press it back or run `headrig neutral`", name,
+        incident.most_mm, incident.first_s);
+}
+
 std::vector<std::string> summary_facts(const TakeRecord& record, const InspectFigures& f) {
     std::vector<std::string> facts;
     facts.push_back(fmt::format("{} frames at {:.4g} Hz, {:.1f} s", f.ticks, record.rate_hz, f.duration_s));
@@ -147,6 +158,7 @@ std::vector<std::string> summary_facts(const TakeRecord& record, const InspectFi
         facts.push_back(fmt::format("swaps repaired: {} names in {} frames; names refused: {}",
                                     f.swaps_repaired, f.repair_ticks, f.names_rejected));
     }
+    for (const MarkerIncident& incident : record.incidents) facts.push_back(incident_text(record, incident));
     if (record.counts_ghosts) {
         facts.push_back(
             fmt::format("ghosts rejected: {} ({:.2f} a frame)", f.ghosts,

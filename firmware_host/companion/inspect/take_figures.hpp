@@ -55,6 +55,8 @@ struct InspectFigures {
 
 [[nodiscard]] InspectFigures figures_of(const TakeRecord& record);
 
+// What happened to a marker, and the remedy.
+[[nodiscard]] std::string incident_text(const TakeRecord& record, const MarkerIncident& incident);
 // Facts for one line, each with its unit.
 [[nodiscard]] std::vector<std::string> summary_facts(const TakeRecord& record, const InspectFigures& figures);
 

@@ -44,6 +44,19 @@ std::size_t names_given(const SolvePack& pack, const Pipeline& pipeline) {
     return given;
 }
 
+void add_incidents(const SolvePack& pack, const FrameReport& report, double time_s, TakeRecord& record) {
+    for (std::size_t k = 0; k < pack.marker_count; ++k) {
+        const MarkerTrouble trouble = report.marker_trouble[k];
+        if (trouble == MarkerTrouble::kNone) continue;
+        auto at =
+            std::find_if(record.incidents.begin(), record.incidents.end(),
+                         [&](const MarkerIncident& i) { return i.marker == k && i.trouble == trouble; });
+        if (at == record.incidents.end())
+            at = record.incidents.insert(at, MarkerIncident{k, trouble, time_s, 0.0});
+        at->most_mm = std::max(at->most_mm, static_cast<double>(report.marker_off_mm[k]));
+    }
+}
+
 }  // namespace
 
 void Histogram::add(double value) {
@@ -124,6 +137,7 @@ void add_tick(const SolvePack& pack, const Pipeline& pipeline, const FaceState& 
         record.residuals_mm.push_back(residual);
     }
     record.ticks.push_back(tick);
+    add_incidents(pack, report, time_s, record);
 }
 
 void add_camera_tick(const SolvePack& pack, const Pipeline& pipeline, const FaceState& state,

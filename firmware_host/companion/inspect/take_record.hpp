@@ -49,6 +49,14 @@ struct TakeTick {
     double camera_shift_px = std::numeric_limits<double>::quiet_NaN();
 };
 
+// A marker that came off or slid.
+struct MarkerIncident {
+    std::size_t marker = 0;
+    MarkerTrouble trouble = MarkerTrouble::kNone;
+    double first_s = 0.0;
+    double most_mm = 0.0;  // off its place, when it slid
+};
+
 // Equal bins over [low, high); what is outside falls into the first or last one.
 struct Histogram {
     double low = 0.0;
@@ -65,11 +73,12 @@ struct TakeRecord {
     double rate_hz = 60.0;
     std::vector<std::string> cameras;  // names, in the pack's order
     std::vector<InspectedMarker> markers;
-    std::vector<TakeTick> ticks;      // in order of time
-    std::vector<Sighting> sightings;  // [ticks x markers]; empty when the take holds no markers
-    std::vector<float> residuals_mm;  // [ticks x markers], NaN where not measured; empty when unknown
-    std::uint64_t missing_ticks = 0;  // that the recording lacks
-    bool counts_ghosts = false;       // unnamed blobs or points are known
+    std::vector<TakeTick> ticks;            // in order of time
+    std::vector<Sighting> sightings;        // [ticks x markers]; empty when the take holds no markers
+    std::vector<float> residuals_mm;        // [ticks x markers], NaN where not measured; empty when unknown
+    std::vector<MarkerIncident> incidents;  // in order of time, one of each kind and marker
+    std::uint64_t missing_ticks = 0;        // that the recording lacks
+    bool counts_ghosts = false;             // unnamed blobs or points are known
     Histogram residual_mm{0.0, 1.5, std::vector<std::uint64_t>(30, 0)};
     Histogram diameter_px{0.0, 25.0, std::vector<std::uint64_t>(25, 0)};
     Histogram contrast{0.0, 1.0, std::vector<std::uint64_t>(25, 0)};

@@ -26,7 +26,7 @@ constexpr std::array<std::string_view, kLastFault> kTexts = {
     "Some markers are not seen; the shapes that hang on them follow the others.",
     "No marker is seen; the last good face is held.",
     "Two markers were mistaken for each other and are being told apart again.",
-    "A marker has moved on the skin or fallen off; recalibrate.",
+    "A marker has slid or fallen off: press it back, replace it or run headrig neutral.",
     "The markers seen do not fix the face well; weights are damped.",
     "The headset has slipped on the head further than the solver can take out.",
     "Noise on the line: damaged frames were dropped.",

@@ -253,5 +253,72 @@ TEST(Pipeline, CamerasOnTheHelmetTellNoHeadPose) {
     EXPECT_EQ(s.state.head.capture_us, 0);
 }
 
+// What tracking is begun anew from is what configure() leaves, how the cameras sit included: a recording that
+// begins with it can be solved again to the same bits.
+TEST(Pipeline, TrackingBegunAnewKnowsNothingOfTheFramesBefore) {
+    test::SyntheticFaceOptions options;
+    options.camera_count = 2;
+    Scene used({}, options);
+    Scene fresh({}, options);
+    SolvePack pack = used.face.pack();
+    for (const double x : {-70.0, 0.0, 70.0})
+        pack.reference_marks[pack.reference_mark_count++] = {Vec3{x, 66.0, 12.0}, 3};
+    ASSERT_TRUE(used.pipeline->configure(pack, {}).has_value());
+    ASSERT_TRUE(fresh.pipeline->configure(pack, {}).has_value());
+    const std::span<const HelmetMark> marks = std::span(pack.reference_marks).first(3);
+    for (int i = 0; i < 120; ++i) step_with_marks(used, marks, Vec3{0.012, -0.009, 0.005});
+    ASSERT_TRUE(used.report.mounts[1].drifted);
+    used.pipeline->reset_tracking();
+    fresh.frame = used.frame;
+    used.random = fresh.random = test::SeededRandom(5);
+    for (int i = 0; i < 60; ++i) {
+        step_with_marks(used, marks, Vec3::Zero());
+        step_with_marks(fresh, marks, Vec3::Zero());
+        EXPECT_EQ(used.report.bootstrapped, fresh.report.bootstrapped) << i;
+        ASSERT_EQ(used.report.mounts[1].turn_rad, fresh.report.mounts[1].turn_rad) << i;
+        ASSERT_EQ(used.report.mounts[1].drifted, fresh.report.mounts[1].drifted) << i;
+        for (std::size_t k = 0; k < 60; ++k)
+            ASSERT_EQ(used.report.face_markers_mm[k], fresh.report.face_markers_mm[k]) << i;
+    }
+}
+
+// Discs of one grey value on another, far enough apart for any detector.
+std::vector<std::uint8_t> discs(std::uint8_t ground, std::uint8_t dot) {
+    std::vector<std::uint8_t> pixels(480U * 640U, ground);
+    for (std::size_t y = 0; y < 640; ++y) {
+        for (std::size_t x = 0; x < 480; ++x) {
+            const double dx = static_cast<double>(x % 60) - 30.0;
+            const double dy = static_cast<double>(y % 64) - 32.0;
+            if (dx * dx + dy * dy < 25.0) pixels[y * 480 + x] = dot;
+        }
+    }
+    return pixels;
+}
+
+TEST(Pipeline, TrackingBegunAnewForgetsWhichSideTheDotsAreOn) {
+    test::SyntheticFaceOptions options;
+    options.camera_count = 1;
+    Scene s({}, options);
+    const std::vector<std::uint8_t> bright = discs(70, 220);
+    const std::vector<std::uint8_t> dark = discs(180, 30);
+    const auto step = [&s](const std::vector<std::uint8_t>& pixels) {
+        FrameSet frame;
+        frame.capture_us = s.now();
+        frame.camera_count = 1;
+        frame.images[0] = ImageView{pixels.data(), 480, 640, 480};
+        frame.status[0] = CameraStatus::kGood;
+        s.pipeline->step(frame, s.state, s.report);
+        ++s.frame;
+    };
+    for (int i = 0; i < 20; ++i) step(bright);
+    ASSERT_EQ(s.pipeline->detector_report(0).polarity, MarkerPolarity::kBright);
+    ASSERT_EQ(s.report.observations[0], 80);
+    s.pipeline->reset_tracking();
+    step(dark);
+    EXPECT_EQ(s.pipeline->detector_report(0).polarity, MarkerPolarity::kDark);
+    EXPECT_EQ(s.report.observations[0], 80);
+    EXPECT_EQ(s.state.faults & fault_bit(Fault::kExposure), 0U) << "other light than before is no step";
+}
+
 }  // namespace
 }  // namespace rig

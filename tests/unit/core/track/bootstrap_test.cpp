@@ -110,7 +110,7 @@ int wrong_names(Scene& s, const std::vector<test::SyntheticFace::View>& views) {
     for (std::size_t k = 0; k < s.face.marker_count(); ++k)
         predicted.push_back(s.fit->headset_position(*s.model, k));
     auto matches = std::make_unique<Matches>();
-    match_views(predicted, *s.sightings, 3.0, s.workspace->matching, *matches);
+    match_views(predicted, *s.sightings, 3.0, s.workspace->naming.matching, *matches);
     int wrong = 0;
     for (std::size_t c = 0; c < views.size(); ++c) {
         for (std::size_t k = 0; k < predicted.size(); ++k) {

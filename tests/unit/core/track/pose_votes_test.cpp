@@ -70,5 +70,28 @@ TEST(PoseVotes, OfNothingAreNone) {
     for (const PoseCandidate& candidate : s.candidates) EXPECT_EQ(candidate.votes, 0U);
 }
 
+// Every marker and every sighting of four cameras in one place: 131,072 votes for one cell.
+TEST(PoseVotes, MoreVotesThanTheCellsHoldDoNotWrap) {
+    auto model = std::make_unique<ShapeModel>();
+    model->marker_count = kMaxMarkers;
+    auto sightings = std::make_unique<SightingSet>();
+    sightings->from_cameras = true;
+    sightings->view_count = kMaxCameras;
+    for (ViewSightings& view : sightings->views) {
+        for (std::size_t i = 0; i < kMaxSightings; ++i)
+            ASSERT_TRUE(view.push_back(Sighting{Vec3{0.0, 0.0, 200.0}, Vec3{0.0, 0.0, -1.0}, 1.0}));
+    }
+    PoseVotesConfig config;
+    config.rotation_step_rad = 0.1;
+    config.translation_range_mm = 20.0;
+    auto workspace = std::make_unique<PoseVotesWorkspace>();
+    BoundedVector<PoseCandidate, kPoseCandidates> candidates;
+    vote_for_poses(*model, config, {}, *sightings, *workspace, candidates);
+    ASSERT_FALSE(candidates.empty());
+    EXPECT_EQ(candidates[0].votes, 65535U);
+    // All 9 sums that hold the cell are full: the answer is a cell of 4 mm off along each axis.
+    EXPECT_LT(candidates[0].pose.translation_mm.head<2>().norm(), 4.0 * 1.415);
+}
+
 }  // namespace
 }  // namespace rig

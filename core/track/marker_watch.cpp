@@ -1,0 +1,149 @@
+#include "core/track/marker_watch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/bounded_vector.hpp"
+#include "core/base/check.hpp"
+
+namespace rig {
+
+namespace {
+
+constexpr double kSamePlaceMm = 1.0;        // of a sighting from frame to frame
+constexpr double kAstrayLearning = 0.05;    // per frame
+constexpr double kDepthInformation = 1e-3;  // 1/mm^2 of the expected place, along a single ray
+constexpr std::uint16_t kMostTicks = 60000;
+constexpr std::size_t kSeenNeighbours = 3;  // of kNeighbours
+
+using MarkerSightings = BoundedVector<Sighting, kMaxCameras>;
+
+std::uint16_t ticks_of(double seconds, double rate_hz) {
+    return static_cast<std::uint16_t>(std::clamp(seconds * rate_hz, 1.0, static_cast<double>(kMostTicks)));
+}
+
+std::uint16_t one_more(std::uint16_t ticks) {
+    return ticks < kMostTicks ? static_cast<std::uint16_t>(ticks + 1) : ticks;
+}
+
+bool faces_a_view(const Topology& topology, double least_cosine, const WatchedFrame& frame, std::size_t k) {
+    if (!frame.sightings.from_cameras) return true;
+    const Vec3 normal = frame.fit.pose.rotation * topology.normal[k];
+    for (std::size_t view = 0; view < frame.sightings.view_count; ++view) {
+        const ViewSightings& seen = frame.sightings.views[view];
+        if (seen.empty()) continue;
+        const Vec3 to_camera = seen[0].point_mm - frame.expected_mm[k];
+        const double along = normal.dot(to_camera);
+        const double squared = to_camera.dot(to_camera);
+        if (along > 0.0 && along * along >= least_cosine * least_cosine * squared) return true;
+    }
+    return false;
+}
+
+bool should_be_seen(const Topology& topology, double least_cosine, const WatchedFrame& frame, std::size_t k) {
+    std::size_t seen = 0;
+    for (const std::uint16_t neighbour : topology.nearest[k])
+        seen += frame.named.markers[neighbour].seen ? 1U : 0U;
+    return seen >= kSeenNeighbours && faces_a_view(topology, least_cosine, frame, k);
+}
+
+// What stands near an unseen marker's place without a name, in every view; false: nothing.
+bool find_astray(double reach_mm, const WatchedFrame& frame, std::size_t k, Vec3& position_mm) {
+    MarkerSightings mine;
+    for (std::size_t view = 0; view < frame.sightings.view_count; ++view) {
+        const ViewSightings& seen = frame.sightings.views[view];
+        double nearest = reach_mm * reach_mm;
+        std::size_t at = seen.size();
+        for (const std::uint16_t j : frame.left_over[view]) {
+            const double d2 = seen[j].squared_distance_mm2(frame.expected_mm[k]);
+            if (d2 >= nearest) continue;
+            nearest = d2;
+            at = j;
+        }
+        if (at == seen.size()) continue;
+        const bool kept = mine.push_back(seen[at]);
+        RIG_CHECK(kept);
+    }
+    if (mine.empty()) return false;
+    const Triangulation point = triangulate(mine.span(), frame.expected_mm[k], kDepthInformation);
+    position_mm = point.position_mm;
+    return point.gap_mm <= kSamePlaceMm;
+}
+
+void watch_unseen(const Topology& topology, const MarkerWatchConfig& config, const WatchedFrame& frame,
+                  std::size_t k, std::span<Vec3> bias_mm, MarkerWatchState& state) {
+    if (should_be_seen(topology, config.facing_cosine, frame, k))
+        state.absent_ticks[k] = one_more(state.absent_ticks[k]);
+    if (state.absent_ticks[k] >= ticks_of(config.fallen_s, config.rate_hz))
+        state.trouble[k] = MarkerTrouble::kFallen;
+    Vec3 position_mm = Vec3::Zero();
+    std::uint16_t& ticks = state.astray_ticks[k];
+    if (!find_astray(config.astray_mm, frame, k, position_mm)) {
+        if (ticks > 0) --ticks;
+        return;
+    }
+    const Vec3 off = frame.fit.pose.rotation.transpose() * (position_mm - frame.expected_mm[k]);
+    if (ticks == 0 || (off - state.astray_mm[k]).squaredNorm() > kSamePlaceMm * kSamePlaceMm) {
+        state.astray_mm[k] = off;
+        ticks = 1;
+        return;
+    }
+    state.astray_mm[k] += kAstrayLearning * (off - state.astray_mm[k]);
+    ticks = one_more(ticks);
+    if (ticks < ticks_of(config.astray_s, config.rate_hz)) return;
+    bias_mm[k] += frame.fit.pose.rotation * state.astray_mm[k];
+    ticks = 0;
+}
+
+bool is_new_expression(const ShapeModel& model, const MarkerWatchConfig& config, const ShapeFit& fit,
+                       MarkerWatchState& state) {
+    double squared = 0.0;
+    for (std::size_t j = 0; j < model.mode_count; ++j) {
+        const double moved = fit.coefficients[j] - state.last_expression[j];
+        squared += moved * moved;
+    }
+    if (squared < config.new_expression * config.new_expression) return false;
+    state.last_expression = fit.coefficients;
+    return true;
+}
+
+// An expression for or against a seen marker that stands off.
+void count_off(double off_mm, const MarkerWatchConfig& config, std::size_t k, MarkerWatchState& state) {
+    std::uint8_t& count = state.off_count[k];
+    if (off_mm > config.slid_mm) {
+        if (count < config.slid_expressions) ++count;
+        if (count == config.slid_expressions) state.trouble[k] = MarkerTrouble::kSlid;
+    } else if (count > 0 && --count == 0 && state.trouble[k] == MarkerTrouble::kSlid) {
+        state.trouble[k] = MarkerTrouble::kNone;
+    }
+}
+
+}  // namespace
+
+double off_its_place_mm(const Rigid& headset_from_face, std::span<const Vec3> neutral_offset_mm,
+                        const Vec3& bias_mm, std::size_t marker) {
+    Vec3 off = bias_mm;
+    if (!neutral_offset_mm.empty()) off -= headset_from_face.rotation * neutral_offset_mm[marker];
+    return std::sqrt(off.dot(off));
+}
+
+void watch_markers(const ShapeModel& model, const Topology& topology, const MarkerWatchConfig& config,
+                   const WatchedFrame& frame, std::span<const Vec3> neutral_offset_mm,
+                   std::span<Vec3> bias_mm, MarkerWatchState& state) {
+    RIG_CHECK(frame.expected_mm.size() == model.marker_count && bias_mm.size() == model.marker_count);
+    if (model.marker_count <= kNeighbours) return;
+    const bool counts = is_new_expression(model, config, frame.fit, state);
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        if (!frame.named.markers[k].seen) {
+            watch_unseen(topology, config, frame, k, bias_mm, state);
+            continue;
+        }
+        state.absent_ticks[k] = 0;
+        state.astray_ticks[k] = 0;
+        if (state.trouble[k] == MarkerTrouble::kFallen) state.trouble[k] = MarkerTrouble::kNone;
+        if (!counts) continue;
+        count_off(off_its_place_mm(frame.fit.pose, neutral_offset_mm, bias_mm[k], k), config, k, state);
+    }
+}
+
+}  // namespace rig

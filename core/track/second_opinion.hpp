@@ -1,0 +1,39 @@
+// Whether the names of a tracked face are the best there are: the face is drawn to the same sightings anew,
+// from other expressions, without what the tracker remembers. A start may put the lower lip on the chin, and
+// motion, prior and learnt bias then keep it there; what gives it away is that sightings are left over beside
+// markers that none was found for, or that the face has to bend. Not for: swaps inside a frame; the tracker's
+// second naming sees those.
+#pragma once
+
+#include <cstdint>
+
+#include "core/track/naming_rounds.hpp"
+
+namespace rig {
+
+// The expression as it is by its leading modes, the mean one, the first three modes far to either side, and
+// the first farther still: a jaw wide open.
+inline constexpr std::uint8_t kOpinions = 10;
+
+struct SecondOpinionState {
+    std::uint8_t left = 0;       // opinions still to be asked for, one a frame
+    std::uint8_t suspicion = 0;  // frames that looked wrong, less those that did not
+    std::uint16_t pause = 0;     // frames until suspicion counts again
+    std::uint16_t next_pause = 0;
+};
+
+// Every opinion is asked for in the frames that follow.
+void ask_for_opinions(SecondOpinionState& state);
+
+// Of one frame and its final names. `odd`: something else about the names is wrong. Suspicion that lasts asks
+// for opinions; when they change nothing, ever more time passes before the next.
+void suspect(const ShapeModel& model, std::span<const Vec3> predicted_mm, const SightingSet& sightings,
+             const Matches& matches, const LeftOverSightings& left_over, bool odd, SecondOpinionState& state);
+
+// One opinion (0..kOpinions - 1) on a frame's sightings and names, `fit` the face behind the names. True:
+// another naming leaves clearly less unexplained (naming_cost_mm2), by at least half a sighting; it is in
+// workspace.matches, its face in workspace.trial. Work is bounded: five coarse and seven whole fits.
+[[nodiscard]] bool second_opinion(const ShapeModel& model, const ShapeFit& fit, const SightingSet& sightings,
+                                  const Matches& matches, std::uint8_t opinion, NamingWorkspace& workspace);
+
+}  // namespace rig

@@ -1,0 +1,137 @@
+#include "core/track/second_opinion.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "tests/support/synthetic_face.hpp"
+
+namespace rig {
+namespace {
+
+// Sighting i of the one view is marker i, on a face that does something.
+struct Scene {
+    Scene() : face({}) {
+        model = test::shape_model_of(face.pack());
+        truth = test::moved(test::creeping_slip(2.0), face.positions(face.weights_at(2.0)));
+        test::add_noise(truth, 0.1, random);
+        for (std::size_t k = 0; k < truth.size(); ++k) right[0][k] = static_cast<std::int16_t>(k);
+    }
+    void see(const std::vector<Vec3>& points) {
+        sightings->clear();
+        add_point_view(points, 0.1, *sightings);
+        fit_to_names(*model, {0.1, 10.0}, ShapeFit{}, *sightings, right, *workspace);
+        fit = workspace->trial;
+    }
+    bool asked(const Matches& names, std::uint8_t opinion) {
+        return second_opinion(*model, fit, *sightings, names, opinion, *workspace);
+    }
+
+    test::SyntheticFace face;
+    std::unique_ptr<ShapeModel> model;
+    test::SeededRandom random{12};
+    std::vector<Vec3> truth;
+    Matches right{};
+    ShapeFit fit;
+    std::unique_ptr<SightingSet> sightings = std::make_unique<SightingSet>();
+    std::unique_ptr<NamingWorkspace> workspace = std::make_unique<NamingWorkspace>();
+};
+
+TEST(SecondOpinion, RightNamesStand) {
+    Scene s;
+    std::vector<Vec3> points = s.truth;
+    points.emplace_back(10.0, -20.0, 30.0);  // and a false dot
+    s.see(points);
+    for (std::uint8_t opinion = 0; opinion < kOpinions; ++opinion)
+        EXPECT_FALSE(s.asked(s.right, opinion)) << int{opinion};
+}
+
+// A row of markers has moved on by one place: nothing is out of order, one sighting is left over.
+TEST(SecondOpinion, NamesThatMovedOnAreFound) {
+    Scene s;
+    s.see(s.truth);
+    for (std::size_t from = 0; from < 60; from += 6) {
+        Matches wrong = s.right;
+        std::size_t a = from;
+        for (int i = 0; i < 3; ++i) {
+            std::size_t nearest = a == 0 ? 1 : 0;
+            for (std::size_t k = 0; k < 60; ++k) {
+                const bool moved_on = wrong[0][k] != s.right[0][k];
+                if (k != a && !moved_on &&
+                    (s.truth[k] - s.truth[a]).norm() < (s.truth[nearest] - s.truth[a]).norm())
+                    nearest = k;
+            }
+            wrong[0][a] = static_cast<std::int16_t>(nearest);
+            a = nearest;
+        }
+        wrong[0][a] = -1;
+        bool found = false;
+        for (std::uint8_t opinion = 0; opinion < kOpinions && !found; ++opinion)
+            found = s.asked(wrong, opinion);
+        ASSERT_TRUE(found) << from;
+        EXPECT_TRUE(std::equal(s.right[0].begin(), s.right[0].begin() + 60, s.workspace->matches[0].begin()));
+    }
+}
+
+TEST(SecondOpinion, WhatIsHiddenLeavesNothingToFind) {
+    Scene s;
+    std::vector<Vec3> points = s.truth;
+    points.resize(50);
+    for (std::size_t k = 50; k < 60; ++k) s.right[0][k] = -1;
+    s.see(points);
+    for (std::uint8_t opinion = 0; opinion < kOpinions; ++opinion)
+        EXPECT_FALSE(s.asked(s.right, opinion)) << int{opinion};
+}
+
+// Frames until opinions are asked for, 0 when not within `frames`.
+int frames_until_asked(const Scene& s, const Matches& names, bool odd, int frames,
+                       SecondOpinionState& state) {
+    LeftOverSightings left_over;
+    find_left_over(60, *s.sightings, names, left_over);
+    for (int i = 1; i <= frames; ++i) {
+        suspect(*s.model, s.truth, *s.sightings, names, left_over, odd, state);
+        if (state.left > 0) return i;
+    }
+    return 0;
+}
+
+TEST(SecondOpinion, OnlySuspicionThatLastsAsks) {
+    Scene s;
+    s.see(s.truth);
+    SecondOpinionState state;
+    EXPECT_EQ(frames_until_asked(s, s.right, false, 1000, state), 0);
+    EXPECT_EQ(frames_until_asked(s, s.right, true, 7, state), 0);
+    EXPECT_EQ(frames_until_asked(s, s.right, false, 1000, state), 0);
+    Matches unnamed = s.right;
+    unnamed[0][7] = -1;  // its sighting stands beside it
+    EXPECT_EQ(frames_until_asked(s, unnamed, false, 100, state), 8);
+    EXPECT_EQ(state.left, kOpinions);
+}
+
+TEST(SecondOpinion, SuspicionThatComesToNothingAsksEverLessOften) {
+    Scene s;
+    s.see(s.truth);
+    SecondOpinionState state;
+    int before = 0;
+    for (int i = 0; i < 9; ++i) {
+        const int frames = frames_until_asked(s, s.right, true, 2000, state);
+        ASSERT_GT(frames, before - 1) << i;
+        before = frames;
+        state.left = 0;
+    }
+    EXPECT_GE(before, 900);
+}
+
+TEST(SecondOpinion, FarAwayIsNotBeside) {
+    Scene s;
+    std::vector<Vec3> points = s.truth;
+    points[7] += Vec3{0.0, 0.0, 60.0};
+    s.see(points);
+    s.right[0][7] = -1;
+    SecondOpinionState state;
+    EXPECT_EQ(frames_until_asked(s, s.right, false, 100, state), 0);
+}
+
+}  // namespace
+}  // namespace rig
