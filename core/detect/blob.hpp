@@ -34,7 +34,7 @@ struct BlobLimits {
     double max_diameter_px = 28.0;   // long axis
     double min_contrast = 10.0;      // grey levels
     double max_aspect = 4.5;         // long axis / short axis
-    double max_deviation_px = 0.14;  // mean distance of the outline from the ellipse of equal moments, plus
+    double max_deviation_px = 0.17;  // mean distance of the outline from the ellipse of equal moments, plus
     double max_deviation = 0.03;     // this part of the mean radius
     double max_open = 0.22;          // part of the moat that is not background
 };

@@ -16,7 +16,6 @@ constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
                                                            0.75};  // of a component's own range of grey
 constexpr double kFringe = 4.0;           // px by which blur and noise lengthen a component
 constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual marker
-constexpr double kSureBadness = 0.7;      // below: good enough to say what the markers of this image are like
 constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
 constexpr double kHopelessBadness = 1.5;  // score 0
 
@@ -122,8 +121,9 @@ Result<void, DetectorError> Detector::configure(const DetectorConfig& config) {
     }
     if (!in_range(blob.max_aspect, 1.01, 100.0) || !in_range(blob.max_deviation, 0.0, 1.0) ||
         !in_range(blob.max_deviation_px, 0.01, 10.0) || !in_range(blob.max_open, 0.01, 1.0) ||
-        !in_range(config.size_ratio, 1.01, 100.0) || !in_range(config.ink_spread, 0.01, 100.0) ||
-        !in_range(config.retro_spread, 0.01, 100.0) || config.size_quorum < 3) {
+        !in_range(config.population.size_ratio, 1.31, 100.0) ||
+        !in_range(config.population.ink_spread, 0.01, 100.0) ||
+        !in_range(config.population.retro_spread, 0.01, 100.0) || config.population.quorum < 3) {
         return failure(DetectorError::kShape);
     }
     if (!in_range(config.min_score, 0.0, 1.0)) return failure(DetectorError::kScore);
@@ -227,9 +227,10 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
 void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResult& result) {
     Workspace& w = workspace_;
     if (w.failed.empty()) return;
-    const double largest = state_.usual_size_px > 0.0
-                               ? wide.largest_px
-                               : largest_marker(usual(&Blob::long_axis_px, result.blobs));
+    const double largest =
+        state_.usual_size_px > 0.0
+            ? wide.largest_px
+            : largest_marker(population_of(result.blobs.span(), config_.population.quorum).size_px);
     const bool narrower = largest < wide.largest_px;
     if (narrower) set_thresholds(means, wide.thresholds, wide.side, largest);
     const Search search{wide.image, wide.thresholds, wide.side,  largest,
@@ -301,32 +302,14 @@ double Detector::largest_marker(double usual_size_px) const {
                                : config_.blob.max_diameter_px;
 }
 
-// Median over the sure markers of an image; 0 when they are too few.
-double Detector::usual(double Blob::* property, const Blobs& blobs) const {
-    std::array<float, kMaxCandidates> values{};
-    std::size_t count = 0;
-    for (const Blob& blob : blobs) {
-        if (blob.badness < kSureBadness) values[count++] = static_cast<float>(blob.*property);
-    }
-    return count < config_.size_quorum ? 0.0 : ranked(std::span(values).first(count), count / 2);
-}
-
-// The markers of one image are of one make: sizes and depths of ink far from the median are eyes, nostrils,
-// teeth, moles or shadows. Without enough sure markers nothing is said.
+// The markers of one image are of one make: what is unlike them is an eye, a nostril, a tooth, a mole or a
+// shadow.
 void Detector::apply_population(Side side, SideResult& result) const {
-    const double size = usual(&Blob::long_axis_px, result.blobs);
-    const double depth = usual(&Blob::depth, result.blobs);
-    const double spread = side == Side::kBelow ? config_.ink_spread : config_.retro_spread;
+    const Population population = population_of(result.blobs.span(), config_.population.quorum);
+    result.usual_size_px = population.size_px;
     result.quality = 0.0;
     for (Blob& blob : result.blobs) {
-        if (size > 0.0) {
-            const double ratio =
-                blob.long_axis_px > size ? blob.long_axis_px / size : size / blob.long_axis_px;
-            blob.badness += std::max(0.0, ratio - 1.0) / (config_.size_ratio - 1.0);
-        }
-        if (depth > 0.0 && blob.depth < depth) {
-            blob.badness += (depth - blob.depth) / (depth * spread);
-        }
+        blob.badness += oddness(population, config_.population, side, blob);
         blob.score = std::clamp(1.0 - blob.badness / kHopelessBadness, 0.0, 1.0);
         result.quality += blob.score * std::min(1.0, blob.contrast / 40.0);
     }
@@ -433,7 +416,7 @@ void Detector::detect(const ImageView& image, Observations& observations, Detect
 void Detector::finish(std::size_t side, Observations& observations, DetectorReport& report) {
     const SideResult& result = workspace_.sides[side];
     report.polarity = side == 0 ? MarkerPolarity::kDark : MarkerPolarity::kBright;
-    state_.usual_size_px = usual(&Blob::long_axis_px, result.blobs);
+    state_.usual_size_px = result.usual_size_px;
     hand_on(result, observations, report);
     measure_markers(result, report);
     if (report.runs_full || report.blobs_full || report.observations_full) {

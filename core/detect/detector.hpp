@@ -12,6 +12,7 @@
 #include "core/base/result.hpp"
 #include "core/detect/blob.hpp"
 #include "core/detect/observation.hpp"
+#include "core/detect/population.hpp"
 #include "core/detect/quick_blob.hpp"
 #include "core/image/view.hpp"
 #include "core/limits.hpp"
@@ -20,13 +21,10 @@ namespace rig {
 
 struct DetectorConfig {
     MarkerPolarity polarity = MarkerPolarity::kAuto;
-    BlobLimits blob;                  // see there: diameters, contrast, shape
-    double relative_contrast = 0.25;  // of the background, that a pixel needs to belong to a candidate
-    double min_score = 0.15;          // 0..1, below which a blob is not handed on
-    double size_ratio = 1.75;         // long axis against the median of the image: one unit of badness
-    double ink_spread = 0.6;    // part of the median depth that a dark marker may lack: one unit of badness;
-    double retro_spread = 1.2;  // of a bright one, whose return falls with the angle
-    std::uint16_t size_quorum = 8;     // markers needed before that median says anything
+    BlobLimits blob;                   // see there: diameters, contrast, shape
+    double relative_contrast = 0.25;   // of the background, that a pixel needs to belong to a candidate
+    double min_score = 0.15;           // 0..1, below which a blob is not handed on
+    PopulationLimits population;       // how far from the other markers of the image
     double dark_luma = 4.0;            // mean grey level below which the image is called dark (F13)
     double saturated_fraction = 0.25;  // of 255s, above which it is called flooded (F13)
     double luma_step = 0.4;  // change of the mean, relative to the usual, that is called a step (F13)
@@ -146,6 +144,7 @@ class Detector {
         Blobs blobs;
         DetectorReport report;
         double quality = 0.0;
+        double usual_size_px = 0.0;  // long axis; 0 when the markers are too few
     };
 
     struct SplitStorage {
@@ -196,7 +195,6 @@ class Detector {
     [[nodiscard]] bool examine(const Search& search, const Component& component, std::span<const Run> runs,
                                const Siblings& siblings, SideResult& result);
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
-    [[nodiscard]] double usual(double Blob::* property, const Blobs& blobs) const;
     void apply_population(Side side, SideResult& result) const;
     [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);
     void decide(std::size_t dark_or_bright);

@@ -50,7 +50,7 @@ TEST_F(DetectorTest, ConfigurationsOutOfRangeAreRefusedByName) {
               static_cast<int>(DetectorError::kContrast));
     EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.max_open = 0.0; }),
               static_cast<int>(DetectorError::kShape));
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.size_ratio = kNan; }),
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.population.size_ratio = kNan; }),
               static_cast<int>(DetectorError::kShape));
     EXPECT_EQ(error_of([](DetectorConfig& c) { c.min_score = 1.5; }),
               static_cast<int>(DetectorError::kScore));
