@@ -6,6 +6,7 @@
 #include "core/base/math.hpp"
 #include "core/detect/blob_shape.hpp"
 #include "core/detect/hidden_part.hpp"
+#include "core/detect/partial_outline.hpp"
 #include "core/image/pixel_lanes.hpp"
 
 namespace rig {
@@ -24,7 +25,10 @@ constexpr int kMoatReach = 3;           // px
 constexpr int kOpen = static_cast<int>(kFull * kOpenCover);
 constexpr int kCorePercent =
     30;  // of the blob's pixels are darker than its core: clear of noise, glints and edge
-constexpr int kMinRing = 12;    // pixels that can carry a plane
+constexpr int kMinRing = 12;          // pixels that can carry a plane
+constexpr double kPartBadness = 1.0;  // of a marker none of whose rim is seen
+constexpr double kLeastSize = 0.7;    // of a completed marker, in usual ones
+constexpr double kMostSize = 1.35;
 constexpr int kRounds = 2;      // outline -> background -> outline
 constexpr int kFraction = 256;  // of a grey level: fixed point of the background plane
 
@@ -495,6 +499,31 @@ void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, c
     judge_shape(fit.rms, limits, blob);
 }
 
+bool may_be_part(const BlobLimits& limits, const Blob& blob) {
+    const bool odd = blob.rejection == Rejection::kNone && blob.badness > kSureBadness;
+    return limits.usual_size_px > 0.0 && (odd || blob.rejection == Rejection::kIrregular);
+}
+
+// The marker of which this blob shows a part, with a bite out of it or with something else at it, when there
+// is one; else the blob as it was.
+void complete_outline(const PlaneFit& fit, const BlobLimits& limits, BlobWorkspace& w, Blob& blob) {
+    Ellipse ellipse;
+    if (!follow_ellipse(w, kHalf, ellipse) || !keep_ellipse(ellipse, w)) return;
+    draw_surroundings(w);
+    const SoftMoments seen = soft_moments(w, kHalf);
+    const SoftMoments moments = fill_moments(
+        seen, {1.0, ellipse.x, ellipse.y, ellipse.xx, ellipse.xy, ellipse.yy}, w.hidden, w.height);
+    if (moments.weight <= 0.0) return;
+    Blob whole = blob;
+    set_axes(moments, w.left, w.top, whole);
+    whole.deviation = outline_deviation_px(w, moments, mean_radius_px(whole));
+    whole.open = open_part(w);
+    judge_shape(fit.rms, limits, whole);
+    whole.badness += kPartBadness * (1.0 - ellipse.followed);
+    const double size = whole.long_axis_px / limits.usual_size_px;
+    if (size > kLeastSize && size < kMostSize && whole.badness < blob.badness) blob = whole;
+}
+
 }  // namespace
 
 Blob measure_blob(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,
@@ -512,6 +541,7 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
     blob.rejection = outline_at_mid_contrast(side, component, limits, w, fit, blob);
     if (blob.rejection != Rejection::kNone) return blob;
     measure_outline(image, fit, kHalf, limits, w, blob);
+    if (may_be_part(limits, blob)) complete_outline(fit, limits, w, blob);
     Rejection reason = Rejection::kNone;
     if (looks_shadowed(blob.rejection) && redraw_blob(w, kDeep, reason)) {
         measure_outline(image, fit, kDeep, limits, w, blob);

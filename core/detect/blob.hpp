@@ -37,6 +37,7 @@ struct BlobLimits {
     double max_deviation_px = 0.17;  // mean distance of the outline from the ellipse of equal moments, plus
     double max_deviation = 0.03;     // this part of the mean radius
     double max_open = 0.22;          // part of the moat that is not background
+    double usual_size_px = 0.0;      // long axis of the image's markers; 0: unknown, nothing is completed
 };
 
 // The least pixels a disc of the least diameter shows above mid contrast, with a margin for blur.
@@ -80,6 +81,7 @@ struct BlobWorkspace {
     int height = 0;
 };
 
+inline constexpr double kSureBadness = 0.7;     // of a blob: below, nothing is wrong with it
 inline constexpr std::uint32_t kPeerAreas = 3;  // a sibling with a third of the blob's area is its equal
 
 // What was cut out of the same larger component, the blob itself among it: markers that touch share the

@@ -212,7 +212,9 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
         connect(std::span<const Run>(w.runs).first(count), {least_area_px(config_.blob)},
                 {w.parents, w.areas, w.grouped, w.components});
     result.report.blobs_full = counts.dropped > 0;
-    const Search search{image, thresholds, side, largest, 0, 0, image.width_px, image.height_px};
+    const double usual = state_.usual_size_px;
+    const Search search{image,          thresholds, side, largest,        usual,
+                        !(usual > 0.0), 0,          0,    image.width_px, image.height_px};
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& component = w.components[c];
         if (examine(search, component, members_of(component, w.grouped), {}, result)) continue;
@@ -227,17 +229,19 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
 void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResult& result) {
     Workspace& w = workspace_;
     if (w.failed.empty()) return;
-    const double largest =
-        state_.usual_size_px > 0.0
-            ? wide.largest_px
-            : largest_marker(population_of(result.blobs.span(), config_.population.quorum).size_px);
+    const double usual = wide.size_follows
+                             ? population_of(result.blobs.span(), config_.population.quorum).size_px
+                             : wide.usual_size_px;
+    const double largest = largest_marker(usual);
     const bool narrower = largest < wide.largest_px;
     if (narrower) set_thresholds(means, wide.thresholds, wide.side, largest);
-    const Search search{wide.image, wide.thresholds, wide.side,  largest,
-                        wide.left,  wide.top,        wide.right, wide.bottom};
+    const Search search{wide.image, wide.thresholds, wide.side, largest,    usual,
+                        false,      wide.left,       wide.top,  wide.right, wide.bottom};
     for (const std::uint16_t c : w.failed) {
         const Component& component = w.components[c];
-        split(search, narrower ? 0 : 1, component, members_of(component, w.grouped), result);
+        const std::span<const Run> runs = members_of(component, w.grouped);
+        if (wide.size_follows && examine(search, component, runs, {}, result)) continue;
+        split(search, narrower ? 0 : 1, component, runs, result);
     }
 }
 
@@ -254,19 +258,22 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         reject(Rejection::kLarge);
         return false;
     }
+    BlobLimits limits = config_.blob;
+    limits.usual_size_px = search.usual_size_px;
     Blob blob;
     QuickStart start;
     const bool alone = stands_alone(component, siblings) && holds_its_middle(component, runs) &&
                        frame_component(search.image, component, start);
-    if (!alone || !measure_quickly(search.image, search.side, start, config_.blob, workspace_.quick, blob)) {
-        blob =
-            measure_blob(search.image, search.side, component, runs, siblings, config_.blob, workspace_.blob);
+    if (!alone || !measure_quickly(search.image, search.side, start, limits, workspace_.quick, blob)) {
+        blob = measure_blob(search.image, search.side, component, runs, siblings, limits, workspace_.blob);
     }
     ++result.report.candidates;
     if (blob.rejection != Rejection::kNone) {
         reject(blob.rejection);
         return blob.rejection == Rejection::kSmall || blob.rejection == Rejection::kFaint;
     }
+    // Another look once the size of the image's markers is known.
+    if (search.size_follows && blob.badness > kSureBadness) return false;
     if (!result.blobs.push_back(blob)) result.report.blobs_full = true;
     return true;
 }

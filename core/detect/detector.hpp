@@ -103,8 +103,10 @@ class Detector {
         const ImageView& image;
         const BlockGrid& thresholds;
         Side side;
-        double largest_px;  // longest marker
-        int left;           // px: what is looked at, and where the thresholds' grid begins
+        double largest_px;     // longest marker
+        double usual_size_px;  // long axis of the image's markers; 0: unknown,
+        bool size_follows;     // for now
+        int left;              // px: what is looked at, and where the thresholds' grid begins
         int top;
         int right;  // exclusive
         int bottom;

@@ -9,7 +9,6 @@ namespace rig {
 
 namespace {
 
-constexpr double kSureBadness = 0.7;  // below: good enough to say what the markers of this image are like
 constexpr double kShownHalf = 4.4;    // short axis^2 / edge^2 at which half the depth is seen at the core
 constexpr double kLeastEdge = 1.0;    // px^2: pixels themselves are that wide
 constexpr double kWide = 0.95;        // shown depth of a marker that shows all of it
