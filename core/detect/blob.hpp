@@ -52,6 +52,11 @@ struct Blob {
     double diameter_px = 0.0;   // of the disc of equal area
     double long_axis_px = 0.0;  // diameters of the ellipse of equal moments
     double short_axis_px = 0.0;
+    double xx = 0.0;  // second moments of that ellipse, px^2
+    double xy = 0.0;
+    double yy = 0.0;
+    bool hidden = false;      // something that is neither paint nor skin lies on it
+    bool completed = false;   // from a part of its outline
     double contrast = 0.0;    // grey levels between blob and background
     double background = 0.0;  // grey level at the centre
     double deviation = 0.0;
@@ -82,7 +87,16 @@ struct BlobWorkspace {
 };
 
 inline constexpr double kSureBadness = 0.7;     // of a blob: below, nothing is wrong with it
+inline constexpr double kPieceSize = 0.85;      // in usual sizes: what is shorter may be a piece of a marker
 inline constexpr std::uint32_t kPeerAreas = 3;  // a sibling with a third of the blob's area is its equal
+
+// Whether a point lies in the ellipse of a blob.
+[[nodiscard]] inline bool is_inside(const Blob& blob, double x_px, double y_px) {
+    const double dx = x_px - blob.x_px;
+    const double dy = y_px - blob.y_px;
+    const double square = blob.yy * dx * dx - 2.0 * blob.xy * dx * dy + blob.xx * dy * dy;
+    return square < 4.0 * (blob.xx * blob.yy - blob.xy * blob.xy);
+}
 
 // What was cut out of the same larger component, the blob itself among it: markers that touch share the
 // pixels between them. Runs of each are in `grouped`. Both empty for a blob that stands alone.

@@ -24,6 +24,9 @@ void set_axes(const SoftMoments& m, int left, int top, Blob& blob) {
     blob.y_px = top + m.y;
     blob.long_axis_px = 4.0 * sqrt(mean + spread);
     blob.short_axis_px = 4.0 * sqrt(std::max(mean - spread, 1.0 / 64.0));
+    blob.xx = m.xx;
+    blob.xy = m.xy;
+    blob.yy = m.yy;
     blob.diameter_px = 1.1283791670955126 * sqrt(m.weight);
 }
 

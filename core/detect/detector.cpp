@@ -17,6 +17,7 @@ constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
 constexpr double kFringe = 4.0;           // px by which blur and noise lengthen a component
 constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual marker
 constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
+constexpr std::uint32_t kSparse = 2;      // boxes are that much larger than what is in them
 constexpr double kHopelessBadness = 1.5;  // score 0
 
 // The parts of `runs` for which inside(x, y) holds, as runs.
@@ -217,7 +218,11 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
                         !(usual > 0.0), 0,          0,    image.width_px, image.height_px};
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& component = w.components[c];
-        if (examine(search, component, members_of(component, w.grouped), {}, result)) continue;
+        const std::size_t before = result.blobs.size();
+        if (examine(search, component, members_of(component, w.grouped), {}, result)) {
+            if (result.blobs.size() > before) w.origins[before] = static_cast<std::uint16_t>(c);
+            continue;
+        }
         if (!w.failed.push_back(static_cast<std::uint16_t>(c))) result.report.blobs_full = true;
     }
     split_failed(search, means, result);
@@ -228,7 +233,7 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
 // marker. Now that the size of the image's markers is known, the background is taken at that scale.
 void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResult& result) {
     Workspace& w = workspace_;
-    if (w.failed.empty()) return;
+    if (w.failed.empty() && !wide.size_follows) return;
     const double usual = wide.size_follows
                              ? population_of(result.blobs.span(), config_.population.quorum).size_px
                              : wide.usual_size_px;
@@ -237,11 +242,32 @@ void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResu
     if (narrower) set_thresholds(means, wide.thresholds, wide.side, largest);
     const Search search{wide.image, wide.thresholds, wide.side, largest,    usual,
                         false,      wide.left,       wide.top,  wide.right, wide.bottom};
+    if (wide.size_follows) examine_pieces(search, result);
     for (const std::uint16_t c : w.failed) {
         const Component& component = w.components[c];
         const std::span<const Run> runs = members_of(component, w.grouped);
         if (wide.size_follows && examine(search, component, runs, {}, result)) continue;
         split(search, narrower ? 0 : 1, component, runs, result);
+    }
+}
+
+// What is too short for a marker of the image was measured before that was known.
+void Detector::examine_pieces(const Search& search, SideResult& result) {
+    Workspace& w = workspace_;
+    std::size_t kept = 0;
+    BoundedVector<std::uint16_t, kMaxBlobs> pieces;
+    for (std::size_t i = 0; i < result.blobs.size(); ++i) {
+        if (result.blobs[i].long_axis_px < kPieceSize * search.usual_size_px) {
+            if (pieces.push_back(w.origins[i])) continue;
+        }
+        result.blobs[kept++] = result.blobs[i];
+    }
+    result.blobs.resize(kept);
+    for (const std::uint16_t c : pieces) {
+        const Component& component = w.components[c];
+        if (!examine(search, component, members_of(component, w.grouped), {}, result)) {
+            if (!w.failed.push_back(c)) result.report.blobs_full = true;
+        }
     }
 }
 
@@ -264,13 +290,18 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
     QuickStart start;
     const bool alone = stands_alone(component, siblings) && holds_its_middle(component, runs) &&
                        frame_component(search.image, component, start);
-    if (!alone || !measure_quickly(search.image, search.side, start, limits, workspace_.quick, blob)) {
+    const bool quick =
+        alone && measure_quickly(search.image, search.side, start, limits, workspace_.quick, blob);
+    if (!quick || blob.long_axis_px < kPieceSize * limits.usual_size_px) {
         blob = measure_blob(search.image, search.side, component, runs, siblings, limits, workspace_.blob);
     }
     ++result.report.candidates;
     if (blob.rejection != Rejection::kNone) {
         reject(blob.rejection);
-        return blob.rejection == Rejection::kSmall || blob.rejection == Rejection::kFaint;
+        const auto box = static_cast<std::uint32_t>((component.right - component.left + 1) *
+                                                    (component.bottom - component.top + 1));
+        const bool sparse = component.area_px * kSparse < box;  // something deep, and shade around it
+        return blob.rejection == Rejection::kSmall || (blob.rejection == Rejection::kFaint && !sparse);
     }
     // Another look once the size of the image's markers is known.
     if (search.size_follows && blob.badness > kSureBadness) return false;
@@ -309,6 +340,22 @@ double Detector::largest_marker(double usual_size_px) const {
                                : config_.blob.max_diameter_px;
 }
 
+// A completed marker and its pieces, or the same one completed from two pieces: the best one stays.
+void Detector::drop_pieces(SideResult& result) {
+    for (std::size_t i = 0; i < result.blobs.size(); ++i) {
+        Blob& whole = result.blobs[i];
+        if (!whole.completed) continue;
+        for (std::size_t k = 0; k < result.blobs.size(); ++k) {
+            Blob& other = result.blobs[k];
+            if (k == i ||
+                !(is_inside(whole, other.x_px, other.y_px) || is_inside(other, whole.x_px, whole.y_px)))
+                continue;
+            const bool worse = other.badness > whole.badness || (other.badness == whole.badness && k > i);
+            (worse ? other : whole).badness += 2.0 * kHopelessBadness;
+        }
+    }
+}
+
 // The markers of one image are of one make: what is unlike them is an eye, a nostril, a tooth, a mole or a
 // shadow.
 void Detector::apply_population(Side side, SideResult& result) const {
@@ -317,6 +364,9 @@ void Detector::apply_population(Side side, SideResult& result) const {
     result.quality = 0.0;
     for (Blob& blob : result.blobs) {
         blob.badness += oddness(population, config_.population, side, blob);
+    }
+    drop_pieces(result);
+    for (Blob& blob : result.blobs) {
         blob.score = std::clamp(1.0 - blob.badness / kHopelessBadness, 0.0, 1.0);
         result.quality += blob.score * std::min(1.0, blob.contrast / 40.0);
     }

@@ -166,8 +166,9 @@ class Detector {
         std::array<Component, kMaxBlobs> components{};
         std::array<SplitStorage, kSplitLevels> split{};
         BoundedVector<std::uint16_t, kMaxBlobs> failed;
-        BoundedVector<Component, kMaxCandidates> examined;  // by earlier windows of the frame
-        BitRows window{};                                   // beyond the threshold, not examined yet
+        std::array<std::uint16_t, kMaxCandidates> origins{};  // component of each blob of the first pass
+        BoundedVector<Component, kMaxCandidates> examined;    // by earlier windows of the frame
+        BitRows window{};                                     // beyond the threshold, not examined yet
         BitRows reach{};
         BitRows part{};
         BlobWorkspace blob;
@@ -190,6 +191,8 @@ class Detector {
     [[nodiscard]] bool is_settled() const;
     [[nodiscard]] std::size_t likely_side() const;
     void finish(std::size_t side, Observations& observations, DetectorReport& report);
+    void examine_pieces(const Search& search, SideResult& result);
+    static void drop_pieces(SideResult& result);
     void split_failed(const Search& wide, const BlockGrid& means, SideResult& result);
     [[nodiscard]] double largest_marker(double usual_size_px) const;
     void split(const Search& search, std::size_t level, const Component& component, std::span<const Run> runs,

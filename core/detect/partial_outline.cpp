@@ -35,6 +35,8 @@ constexpr int kSectors = 16;                     // of the rim
 constexpr double kEighth = 0.41421356237309503;  // tangent of an eighth of half a turn
 constexpr double kInside = 0.8;                  // px within the ellipse where there should be paint,
 constexpr double kOutside = 1.0;                 // and outside it where there should be none
+constexpr double kRimPx = 1.0;                   // what reaches so far out goes on beyond
+constexpr int kLeastPiece = 3;                   // pixels
 constexpr double kLeastFollowed = 0.6;
 constexpr double kLeastFilled = 0.5;
 
@@ -214,6 +216,36 @@ bool fit_in_rounds(std::span<const Point> some, std::span<const Point> all, Coni
 }
 
 }  // namespace
+
+void mark_disc(double x, double y, double radius, const BlobWorkspace& w, BitRows& disc) {
+    const Ellipse circle{x, y, 0.25 * radius * radius, 0.0, 0.25 * radius * radius};
+    disc.fill(0);
+    for (int row = 0; row < w.height; ++row) {
+        disc[static_cast<std::size_t>(row)] = span_of(circle, row, 0.0) & row_mask(w.width);
+    }
+}
+
+bool gather_pieces(double x, double y, double radius, int outline, BlobWorkspace& w) {
+    BitRows disc;
+    BitRows inner;
+    mark_disc(x, y, radius, w, disc);
+    mark_disc(x, y, radius - kRimPx, w, inner);
+    BitRows paint{};
+    BitRows leaving{};
+    for (std::size_t row = 0; row < static_cast<std::size_t>(w.height); ++row) {
+        for (std::uint64_t bits = disc[row] & ~w.foreign[row]; bits != 0; bits &= bits - 1) {
+            const auto column = static_cast<std::size_t>(std::countr_zero(bits));
+            if (w.cover[row][column] >= outline) paint[row] |= std::uint64_t{1} << column;
+        }
+        leaving[row] = paint[row] & ~inner[row];
+    }
+    flood(leaving, paint, w.height);
+    const int before = count_bits(w.blob, w.height);
+    for (std::size_t row = 0; row < static_cast<std::size_t>(w.height); ++row) paint[row] &= ~leaving[row];
+    if (count_bits(paint, w.height) < before + kLeastPiece) return false;
+    w.blob = paint;
+    return true;
+}
 
 bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
     Points points;

@@ -18,6 +18,14 @@ struct Ellipse {
     double followed = 0.0;  // part of its rim that the outline follows
 };
 
+// Makes the blob every piece of paint, at which cover passes `outline`, that lies within `radius` of a place
+// of the window and does not go on beyond it. False when that is no more than the blob already was. Cover
+// must be known as far.
+[[nodiscard]] bool gather_pieces(double x, double y, double radius, int outline, BlobWorkspace& workspace);
+
+// Pixels of the window within `radius` of a place.
+void mark_disc(double x, double y, double radius, const BlobWorkspace& workspace, BitRows& disc);
+
 // The ellipse along which most of the outline lies at which cover passes `outline`, of workspace.blob and
 // whatever else of it is inside. Weighted algebraic fit (Sampson82, eq. 1 as weights) in rounds that leave
 // out what lies farther and farther off. False when there is no such ellipse.

@@ -21,6 +21,7 @@ constexpr double kFlattest =
 constexpr double kFlatSpread = 0.1;  // one unit of badness
 constexpr double kLeastDepthSpread = 0.02;
 constexpr double kUnknownDepthSpread = 0.1;
+constexpr double kPartLack = 0.5;         // of a completed marker: what lies on it takes depth
 constexpr double kExcessSpread = 0.2;     // of ink's depth: one unit of badness
 constexpr double kRetroLack = 0.62;       // of the paint's depth: what angles explain; beyond it,
 constexpr double kRetroLackSpread = 0.2;  // one unit of badness more
@@ -100,7 +101,7 @@ double oddness(const Population& p, const PopulationLimits& limits, Side side, c
     const double free = std::clamp(kFreeSpreads * p.size_spread, kLeastFreeSize, kMostFreeSize);
     const double shown = shown_depth(blob.short_axis_px, p.edge_px2);
     const double depth = blob.depth / p.depth;
-    const double lack = std::max(0.0, shown - depth);
+    const double lack = std::max(0.0, shown - depth) * (blob.completed && dark ? kPartLack : 1.0);
     double badness = kSizeSlope * ratio + std::max(0.0, ratio - free) / (limits.size_ratio - 1.0 - free);
     badness += lack / (dark ? limits.ink_spread : limits.retro_spread);
     badness += std::max(0.0, kFlattest - blob.short_axis_px / p.size_px) / kFlatSpread;
