@@ -55,14 +55,16 @@ struct Blob {
     double xx = 0.0;  // second moments of that ellipse, px^2
     double xy = 0.0;
     double yy = 0.0;
-    bool hidden = false;      // something that is neither paint nor skin lies on it
-    bool completed = false;   // from a part of its outline
-    double contrast = 0.0;    // grey levels between blob and background
+    bool hidden = false;     // something that is neither paint nor skin lies on it
+    bool completed = false;  // from a part of its outline
+    double contrast = 0.0;   // grey levels between blob and background
+    double snr = 0.0;        // contrast / rms of the surroundings about their plane, of a grey level at least
     double background = 0.0;  // grey level at the centre
     double deviation = 0.0;
     double open = 0.0;
     double depth =
         0.0;  // contrast / light: the part of the skin's light that the ink takes, or the paint adds
+    double slope = 0.0;    // edge_slope(); 0 while unknown
     double badness = 0.0;  // 0 = a perfect disc; 1 = as far off as any one limit allows
     double score = 0.0;    // 0..1, from badness and the other blobs of the image
     Rejection rejection = Rejection::kSmall;

@@ -10,8 +10,8 @@ namespace {
 
 constexpr double kAspectBadness = 0.3;  // of the flattest disc
 constexpr double kNoiseDeviationPx =
-    1.5;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
-constexpr double kSureSnr = 6.0;   // contrast / spread of the surroundings: less costs
+    2.2;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
+constexpr double kSureSnr = 5.0;   // contrast / spread of the surroundings: less costs
 constexpr double kLeastSnr = 2.5;  // below: no telling it from noise
 
 }  // namespace
@@ -40,6 +40,7 @@ void judge_shape(double noise, const BlobLimits& limits, Blob& blob) {
     const double deviation_limit = limits.max_deviation_px + limits.max_deviation * mean_radius_px(blob) +
                                    kNoiseDeviationPx * noise_share;
     const double snr = 1.0 / noise_share;
+    blob.snr = snr;
     blob.badness = blob.deviation / deviation_limit + blob.open / limits.max_open +
                    kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) +
                    std::max(0.0, kSureSnr - snr) / kSureSnr;

@@ -216,7 +216,7 @@ bool Detector::search_windows(const ImageView& image, Side side, std::span<const
     for (const ExpectedMarker& marker : expected) {
         if (is_usable(marker) && !search_window(image, side, marker, result)) return false;
     }
-    apply_population(side, result);
+    apply_population(image, side, result);
     std::size_t sure = 0;
     std::size_t met = 0;
     for (const ExpectedMarker& marker : expected) {

@@ -4,6 +4,7 @@
 
 #include "core/base/math.hpp"
 #include "core/detect/components.hpp"
+#include "core/detect/edge_slope.hpp"
 #include "core/image/kernels.hpp"
 
 namespace rig {
@@ -18,6 +19,7 @@ constexpr double kFringe = 4.0;           // px by which blur and noise lengthen
 constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual marker
 constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
 constexpr std::uint32_t kSparse = 2;      // boxes are that much larger than what is in them
+constexpr double kDimmest = 0.4;          // of the least contrast, in a dim image
 constexpr double kHopelessBadness = 1.5;  // score 0
 
 // The parts of `runs` for which inside(x, y) holds, as runs.
@@ -141,6 +143,7 @@ void Detector::measure_exposure(const ImageView& image, DetectorReport& report) 
     const LumaSums sums = luma_sums(image, kLumaRows);
     report.mean_luma = static_cast<double>(sums.sum) / sums.samples;
     report.saturated_fraction = static_cast<double>(sums.saturated) / sums.samples;
+    state_.luma = report.mean_luma;
     if (report.mean_luma < config_.dark_luma)
         report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kDark);
     if (report.saturated_fraction > config_.saturated_fraction) {
@@ -158,13 +161,20 @@ void Detector::measure_exposure(const ImageView& image, DetectorReport& report) 
     if (report.exposure != 0) report.faults |= fault_bit(Fault::kExposure);
 }
 
+// In an image with little light all contrasts are small, and so is its noise.
+double Detector::least_contrast(Side side) const {
+    const double enough = side == Side::kBelow ? config_.dim_luma_ink : config_.dim_luma_retro;
+    const double part = state_.luma < 0.0 ? 1.0 : state_.luma / enough;
+    return config_.blob.min_contrast * std::clamp(part, kDimmest, 1.0);
+}
+
 // The background is what remains when everything narrower than the largest disc is taken away (a closing for
 // dark discs, an opening for bright ones); a pixel is a candidate when it differs from it by a part of it.
 void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side,
                               double largest_px) {
     std::copy(means.values.begin(), means.values.end(), thresholds.values.begin());
     const int radius = (static_cast<int>(largest_px) / static_cast<int>(kBlockPx) + 2) / 2;
-    const int least = static_cast<int>(config_.blob.min_contrast);
+    const int least = static_cast<int>(least_contrast(side));
     const int part = static_cast<int>(config_.relative_contrast * 256.0);
     if (side == Side::kBelow) {
         sliding_max(thresholds, radius, workspace_.slide);
@@ -182,7 +192,7 @@ void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& threshold
 
 // Texture and noise just reach the threshold; a marker whose mid contrast does has pixels well beyond it.
 bool Detector::has_core(const Search& search, std::span<const Run> runs) const {
-    const int least = static_cast<int>(config_.blob.min_contrast);
+    const int least = static_cast<int>(least_contrast(search.side));
     const int part = static_cast<int>(config_.relative_contrast * 256.0);
     const int whole = search.side == Side::kBelow ? 256 - part : 256 + part;
     const int sign = search.side == Side::kBelow ? 1 : -1;
@@ -226,7 +236,7 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
         if (!w.failed.push_back(static_cast<std::uint16_t>(c))) result.report.blobs_full = true;
     }
     split_failed(search, means, result);
-    apply_population(side, result);
+    apply_population(image, side, result);
 }
 
 // Blobs that are no markers may hold some: a marker hangs together with a shadow, a strip of light or another
@@ -286,6 +296,7 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
     }
     BlobLimits limits = config_.blob;
     limits.usual_size_px = search.usual_size_px;
+    limits.min_contrast = least_contrast(search.side);
     Blob blob;
     QuickStart start;
     const bool alone = stands_alone(component, siblings) && holds_its_middle(component, runs) &&
@@ -358,7 +369,11 @@ void Detector::drop_pieces(SideResult& result) {
 
 // The markers of one image are of one make: what is unlike them is an eye, a nostril, a tooth, a mole or a
 // shadow.
-void Detector::apply_population(Side side, SideResult& result) const {
+void Detector::apply_population(const ImageView& image, Side side, SideResult& result) const {
+    for (Blob& blob : result.blobs) {
+        const bool matters = side == Side::kBelow && blob.badness < kHopelessBadness;
+        if (matters && blob.short_axis_px > kLeastSlopeWidthPx) blob.slope = edge_slope(image, side, blob);
+    }
     const Population population = population_of(result.blobs.span(), config_.population.quorum);
     result.usual_size_px = population.size_px;
     result.quality = 0.0;

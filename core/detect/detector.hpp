@@ -21,10 +21,12 @@ namespace rig {
 
 struct DetectorConfig {
     MarkerPolarity polarity = MarkerPolarity::kAuto;
-    BlobLimits blob;                   // see there: diameters, contrast, shape
-    double relative_contrast = 0.25;   // of the background, that a pixel needs to belong to a candidate
-    double min_score = 0.15;           // 0..1, below which a blob is not handed on
-    PopulationLimits population;       // how far from the other markers of the image
+    BlobLimits blob;                  // see there: diameters, contrast, shape
+    double relative_contrast = 0.25;  // of the background, that a pixel needs to belong to a candidate
+    double min_score = 0.15;          // 0..1, below which a blob is not handed on
+    PopulationLimits population;      // how far from the other markers of the image
+    double dim_luma_ink = 24.0;  // mean grey level below which dark markers may have less than min_contrast,
+    double dim_luma_retro = 12.0;      // and bright ones
     double dark_luma = 4.0;            // mean grey level below which the image is called dark (F13)
     double saturated_fraction = 0.25;  // of 255s, above which it is called flooded (F13)
     double luma_step = 0.4;  // change of the mean, relative to the usual, that is called a step (F13)
@@ -134,7 +136,8 @@ class Detector {
         MarkerPolarity polarity = MarkerPolarity::kAuto;  // the last decision
         std::uint8_t agreed = 0;                          // frames in a row that said so
         double usual_size_px = 0.0;                       // long axis; 0 while unknown
-        double usual_luma = -1.0;                         // running mean; negative before the first frame
+        double luma = -1.0;        // of the last frame that was looked at whole or in parts; negative before
+        double usual_luma = -1.0;  // running mean; negative before the first frame
     };
 
     using Blobs = BoundedVector<Blob, kMaxCandidates>;
@@ -176,6 +179,7 @@ class Detector {
         std::array<SideResult, 2> sides;
     };
 
+    [[nodiscard]] double least_contrast(Side side) const;
     void measure_exposure(const ImageView& image, DetectorReport& report);
     void set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side, double largest_px);
     void detect_side(const ImageView& image, const BlockGrid& means, Side side, SideResult& result);
@@ -200,7 +204,7 @@ class Detector {
     [[nodiscard]] bool examine(const Search& search, const Component& component, std::span<const Run> runs,
                                const Siblings& siblings, SideResult& result);
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
-    void apply_population(Side side, SideResult& result) const;
+    void apply_population(const ImageView& image, Side side, SideResult& result) const;
     [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);
     void decide(std::size_t dark_or_bright);
     void measure_markers(const SideResult& result, DetectorReport& report) const;

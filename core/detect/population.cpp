@@ -21,8 +21,13 @@ constexpr double kFlattest =
 constexpr double kFlatSpread = 0.1;  // one unit of badness
 constexpr double kLeastDepthSpread = 0.02;
 constexpr double kUnknownDepthSpread = 0.1;
-constexpr double kPartLack = 0.5;         // of a completed marker: what lies on it takes depth
-constexpr double kExcessSpread = 0.2;     // of ink's depth: one unit of badness
+constexpr double kPartLack = 0.5;       // of a completed marker: what lies on it takes depth
+constexpr double kExcessSpread = 0.12;  // of ink's depth: one unit of badness
+constexpr double kFreeSlopeSpreads = 2.0;
+constexpr double kLeastFreeSlope = 0.03;
+constexpr double kSlopeSpread = 0.08;  // of the slope: one unit of badness
+constexpr double kSlopeNoise = 0.9;  // standard deviations of the slope, per noise / contrast, and twice that
+constexpr double kAloneOpen = 0.03;
 constexpr double kRetroLack = 0.62;       // of the paint's depth: what angles explain; beyond it,
 constexpr double kRetroLackSpread = 0.2;  // one unit of badness more
 
@@ -39,6 +44,16 @@ double spread_about(double centre, std::span<float> values) {
         value = static_cast<float>(off < 0.0 ? -off : off);
     }
     return 1.5 * median(values);
+}
+
+// A hole fades where ink ends: badness of an edge less steep than the others'.
+double softness(const Population& p, const Blob& blob) {
+    // Where something lies on it or beside it, there are other edges.
+    const bool alone = !blob.completed && !blob.hidden && blob.open < kAloneOpen;
+    if (!alone || !(p.slope > 0.0) || !(blob.slope != 0.0)) return 0.0;
+    const double free = std::max(kFreeSlopeSpreads * p.slope_spread, kLeastFreeSlope);
+    const double lack = 1.0 - blob.slope / p.slope - free - kSlopeNoise / std::max(blob.snr, 1.0);
+    return std::max(0.0, lack) / kSlopeSpread;
 }
 
 }  // namespace
@@ -81,6 +96,14 @@ Population population_of(std::span<const Blob> blobs, std::size_t quorum) {
         value = blob.depth;
         return true;
     }));
+    const auto slopes = gather([](const Blob& blob, double& value) {
+        value = blob.slope;
+        return blob.slope > 0.0 && blob.short_axis_px > kLeastSlopeWidthPx;
+    });
+    if (slopes.size() >= quorum) {
+        population.slope = median(slopes);
+        population.slope_spread = spread_about(population.slope, slopes) / population.slope;
+    }
     const auto depths = gather([&](const Blob& blob, double& value) {
         value = blob.depth;
         return shown_depth(blob.short_axis_px, population.edge_px2) > kWide;
@@ -108,7 +131,7 @@ double oddness(const Population& p, const PopulationLimits& limits, Side side, c
     if (dark) {
         // Ink is as dark as it is; a hole is darker.
         const double excess = depth - 1.0 - 3.0 * std::max(p.depth_spread, kLeastDepthSpread);
-        badness += std::max(0.0, excess) / kExcessSpread;
+        badness += std::max(0.0, excess) / kExcessSpread + softness(p, blob);
     } else {
         badness += std::max(0.0, lack - kRetroLack * shown) / kRetroLackSpread;
     }

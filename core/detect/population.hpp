@@ -19,6 +19,8 @@ struct Population {
     double depth = 0.0;
     double depth_spread = 0.0;  // relative to depth, of markers wide enough to show all of it
     double edge_px2 = 0.0;      // edge_square_px2()
+    double slope = 0.0;         // edge_slope() of dark markers wide enough to have one; 0: unknown
+    double slope_spread = 0.0;  // relative to slope
 };
 
 struct PopulationLimits {
@@ -31,6 +33,9 @@ struct PopulationLimits {
 // Square of an edge's width, px^2, up to a factor: what the axes of equal moments enclose beyond the area.
 // About 16 variances of the lens, whatever the size and the shape.
 [[nodiscard]] double edge_square_px2(const Blob& blob);
+
+// Narrower ones have no edge of their own behind the lens.
+inline constexpr double kLeastSlopeWidthPx = 4.3;
 
 // 0..1: part of its depth that a marker `short_axis_px` across shows at its core, the lens being what it is.
 [[nodiscard]] double shown_depth(double short_axis_px, double edge_px2);

@@ -99,6 +99,23 @@ TEST_F(DetectorTest, LightAtTheMarkersIsMeasuredForExposureControl) {
     EXPECT_EQ(report.faintest_contrast, 0.0);
 }
 
+TEST_F(DetectorTest, FaintMarkersOfADimImageAreFound) {
+    for (const bool bright : {false, true}) {
+        test::Scene scene = test::lattice_scene(12, 1.2, bright, 4);
+        scene.light = {.skin = bright ? 4.0 : 12.0,
+                       .gradient = 0.0,
+                       .vignetting = 0.0,
+                       .texture = 0.0,
+                       .read_noise = 1.0,
+                       .shot_noise = 0.0};
+        for (test::SceneDot& dot : scene.dots) dot.paint = bright ? 2.8 : 0.35;  // 7 or 8 grey levels
+        detector->reset();
+        detect(test::render(scene));
+        EXPECT_GE(observations.size(), scene.dots.size() * 98 / 100) << bright;
+        EXPECT_LE(observations.size(), scene.dots.size()) << bright;
+    }
+}
+
 TEST_F(DetectorTest, ExposureFlagsFollowTheCatalogue) {
     const auto flagged = [&](ExposureFlag flag) {
         return (report.exposure & static_cast<std::uint8_t>(flag)) != 0;

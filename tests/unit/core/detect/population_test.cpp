@@ -83,4 +83,21 @@ TEST(Population, SizeAndDepthCost) {
     EXPECT_GT(oddness_of(marker(10.0, 8.5, 0.15), Side::kAbove), 1.0);  // but not to nothing
 }
 
+TEST(Population, AnEdgeThatFadesIsAHole) {
+    std::vector<Blob> blobs = ink_markers();
+    for (Blob& blob : blobs) blob.slope = 0.72, blob.snr = 50.0;
+    const Population population = population_of(blobs, 8);
+    EXPECT_NEAR(population.slope, 0.72, 1e-6);
+    Blob hole = blobs[10];
+    const double before = oddness(population, {}, Side::kBelow, hole);
+    hole.slope = 0.55;
+    EXPECT_GT(oddness(population, {}, Side::kBelow, hole), before + 1.0);
+    EXPECT_EQ(oddness(population, {}, Side::kAbove, hole), oddness(population, {}, Side::kAbove, blobs[10]));
+    hole.snr = 4.0;  // as far off as noise may take it
+    EXPECT_LT(oddness(population, {}, Side::kBelow, hole), before + 0.1);
+    hole.snr = 50.0;
+    hole.hidden = true;  // what lies on it has edges of its own
+    EXPECT_EQ(oddness(population, {}, Side::kBelow, hole), before);
+}
+
 }  // namespace
