@@ -578,7 +578,7 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
     const bool several = blob.rejection == Rejection::kSeveral;
     if (blob.rejection != Rejection::kNone && !several) return blob;
     if (!several) measure_outline(image, fit, kHalf, limits, w, blob);
-    if (limits.usual_size_px > 0.0) {
+    if (may_be_completed(side, limits, blob)) {
         if (several) {
             w.blob.fill(0);
             join_pieces(side, fit, limits, 0.5 * (component.left + component.right) - w.left,

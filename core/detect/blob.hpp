@@ -38,6 +38,7 @@ struct BlobLimits {
     double max_deviation = 0.03;     // this part of the mean radius
     double max_open = 0.22;          // part of the moat that is not background
     double usual_size_px = 0.0;      // long axis of the image's markers; 0: unknown, nothing is completed
+    double usual_depth = 0.0;        // of their depths
 };
 
 // The least pixels a disc of the least diameter shows above mid contrast, with a margin for blur.

@@ -14,6 +14,10 @@ constexpr double kNoiseDeviationPx =
 constexpr double kSureSnr = 5.0;   // contrast / spread of the surroundings: less costs
 constexpr double kLeastSnr = 2.5;  // below: no telling it from noise
 
+constexpr double kLongest = 1.7;         // of what a part of one may be in
+constexpr double kLeastInkDepth = 0.45;  // of it, in usual depths
+constexpr double kLeastRetroDepth = 0.25;
+
 }  // namespace
 
 void set_axes(const SoftMoments& m, int left, int top, Blob& blob) {
@@ -58,6 +62,12 @@ void judge_shape(double noise, const BlobLimits& limits, Blob& blob) {
     } else if (blob.deviation > deviation_limit) {
         blob.rejection = Rejection::kIrregular;
     }
+}
+
+bool may_be_completed(Side side, const BlobLimits& limits, const Blob& blob) {
+    const double least = side == Side::kBelow ? kLeastInkDepth : kLeastRetroDepth;
+    return limits.usual_size_px > 0.0 && blob.depth > least * limits.usual_depth &&
+           blob.long_axis_px < kLongest * limits.usual_size_px;
 }
 
 bool looks_shadowed(Rejection rejection) {

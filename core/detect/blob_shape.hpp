@@ -34,6 +34,9 @@ inline constexpr double kSoftRamp =
 inline constexpr double kHiddenCover = 0.4;   // beyond the skin, the other way: neither paint nor skin
 inline constexpr double kDeepBadness = 0.25;  // of a marker that only shows at the deep outline
 
+// Worth completing: of the paint of the image's markers, and not so long that no marker is in it.
+[[nodiscard]] bool may_be_completed(Side side, const BlobLimits& limits, const Blob& blob);
+
 // Refused for what shadow does to an outline: worth another look at the deep one.
 [[nodiscard]] bool looks_shadowed(Rejection rejection);
 

@@ -20,6 +20,7 @@ constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual 
 constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
 constexpr std::uint32_t kSparse = 2;      // boxes are that much larger than what is in them
 constexpr double kDimmest = 0.4;          // of the least contrast, in a dim image
+constexpr double kTriedSizes = 1.5;       // long components are no one marker
 constexpr double kHopelessBadness = 1.5;  // score 0
 
 // The parts of `runs` for which inside(x, y) holds, as runs.
@@ -79,6 +80,10 @@ std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span
     }
     const int level = shallowest + static_cast<int>(depth * (deepest - shallowest));
     return cut(runs, out, truncated, [&](int x, int y) { return (search.image.row(y)[x] ^ turn) > level; });
+}
+
+int length_of(const Component& component) {
+    return std::max(component.right - component.left, component.bottom - component.top) + 1;
 }
 
 // Whether the middle of a component's box is part of it.
@@ -223,9 +228,9 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
         connect(std::span<const Run>(w.runs).first(count), {least_area_px(config_.blob)},
                 {w.parents, w.areas, w.grouped, w.components});
     result.report.blobs_full = counts.dropped > 0;
-    const double usual = state_.usual_size_px;
-    const Search search{image,          thresholds, side, largest,        usual,
-                        !(usual > 0.0), 0,          0,    image.width_px, image.height_px};
+    const bool follows = !(state_.usual_size_px > 0.0);
+    const Search search{image,   thresholds, side, largest,        state_.usual_size_px, state_.usual_depth,
+                        follows, 0,          0,    image.width_px, image.height_px};
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& component = w.components[c];
         const std::size_t before = result.blobs.size();
@@ -244,20 +249,27 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
 void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResult& result) {
     Workspace& w = workspace_;
     if (w.failed.empty() && !wide.size_follows) return;
-    const double usual = wide.size_follows
-                             ? population_of(result.blobs.span(), config_.population.quorum).size_px
-                             : wide.usual_size_px;
+    double usual = wide.usual_size_px;
+    double depth = wide.usual_depth;
+    if (wide.size_follows) {
+        const Population population = population_of(result.blobs.span(), config_.population.quorum);
+        usual = population.size_px;
+        depth = population.depth;
+    }
     const double largest = largest_marker(usual);
     const bool narrower = largest < wide.largest_px;
     if (narrower) set_thresholds(means, wide.thresholds, wide.side, largest);
-    const Search search{wide.image, wide.thresholds, wide.side, largest,    usual,
+    const Search search{wide.image, wide.thresholds, wide.side, largest,    usual,      depth,
                         false,      wide.left,       wide.top,  wide.right, wide.bottom};
     if (wide.size_follows) examine_pieces(search, result);
     for (const std::uint16_t c : w.failed) {
         const Component& component = w.components[c];
         const std::span<const Run> runs = members_of(component, w.grouped);
         if (wide.size_follows && examine(search, component, runs, {}, result)) continue;
-        split(search, narrower ? 0 : 1, component, runs, result);
+        // What a marker may be a part of was tried as a whole; then its own parts are not.
+        Search inner = search;
+        if (length_of(component) < kTriedSizes * usual) inner.usual_size_px = 0.0;
+        split(inner, narrower ? 0 : 1, component, runs, result);
     }
 }
 
@@ -289,13 +301,14 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         reject(Rejection::kFaint);
         return true;
     }
-    const int longest = std::max(component.right - component.left, component.bottom - component.top) + 1;
+    const int longest = length_of(component);
     if (longest > search.largest_px + kFringe) {
         reject(Rejection::kLarge);
         return false;
     }
     BlobLimits limits = config_.blob;
     limits.usual_size_px = search.usual_size_px;
+    limits.usual_depth = search.usual_depth;
     limits.min_contrast = least_contrast(search.side);
     Blob blob;
     QuickStart start;
@@ -376,6 +389,7 @@ void Detector::apply_population(const ImageView& image, Side side, SideResult& r
     }
     const Population population = population_of(result.blobs.span(), config_.population.quorum);
     result.usual_size_px = population.size_px;
+    result.usual_depth = population.depth;
     result.quality = 0.0;
     for (Blob& blob : result.blobs) {
         blob.badness += oddness(population, config_.population, side, blob);
@@ -489,6 +503,7 @@ void Detector::finish(std::size_t side, Observations& observations, DetectorRepo
     const SideResult& result = workspace_.sides[side];
     report.polarity = side == 0 ? MarkerPolarity::kDark : MarkerPolarity::kBright;
     state_.usual_size_px = result.usual_size_px;
+    state_.usual_depth = result.usual_depth;
     hand_on(result, observations, report);
     measure_markers(result, report);
     if (report.runs_full || report.blobs_full || report.observations_full) {

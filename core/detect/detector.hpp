@@ -107,6 +107,7 @@ class Detector {
         Side side;
         double largest_px;     // longest marker
         double usual_size_px;  // long axis of the image's markers; 0: unknown,
+        double usual_depth;    // of their depths; 0: unknown
         bool size_follows;     // for now
         int left;              // px: what is looked at, and where the thresholds' grid begins
         int top;
@@ -136,6 +137,7 @@ class Detector {
         MarkerPolarity polarity = MarkerPolarity::kAuto;  // the last decision
         std::uint8_t agreed = 0;                          // frames in a row that said so
         double usual_size_px = 0.0;                       // long axis; 0 while unknown
+        double usual_depth = 0.0;
         double luma = -1.0;        // of the last frame that was looked at whole or in parts; negative before
         double usual_luma = -1.0;  // running mean; negative before the first frame
     };
@@ -150,6 +152,7 @@ class Detector {
         DetectorReport report;
         double quality = 0.0;
         double usual_size_px = 0.0;  // long axis; 0 when the markers are too few
+        double usual_depth = 0.0;
     };
 
     struct SplitStorage {
