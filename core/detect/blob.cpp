@@ -6,6 +6,7 @@
 #include "core/base/math.hpp"
 #include "core/detect/blob_shape.hpp"
 #include "core/detect/hidden_part.hpp"
+#include "core/detect/partial_outline.hpp"
 #include "core/detect/window_sums.hpp"
 #include "core/image/pixel_lanes.hpp"
 
@@ -26,8 +27,12 @@ constexpr int kRingReach = 5;           // px
 constexpr int kOpen = static_cast<int>(kFull * kOpenCover);
 constexpr int kCorePercent =
     30;  // of the blob's pixels are darker than its core: clear of noise, glints and edge
-constexpr int kMinRing = 12;  // pixels that can carry a plane
-constexpr int kRounds = 2;    // outline -> background -> outline
+constexpr int kMinRing = 12;          // pixels that can carry a plane
+constexpr double kPartBadness = 0.5;  // of a marker none of whose rim is seen
+constexpr double kLeastSize = 0.7;    // of a completed marker, in usual ones
+constexpr double kMostSize = 1.35;
+constexpr double kPieceReach = 1.1;  // of it, from a piece's middle
+constexpr int kRounds = 2;           // outline -> background -> outline
 
 // Grey level at column x, row y of the window: level + slope_x (x - centre_x) + slope_y (y - centre_y).
 struct Plane {
@@ -42,12 +47,19 @@ struct Plane {
     }
 };
 
+// Pieces of a marker are looked for as far around them as a marker is long.
+int margin_of(int length, const BlobLimits& limits) {
+    if (length >= kMostSize * limits.usual_size_px) return kMargin;
+    const int room = (static_cast<int>(kBlobWindowPx) - length) / 2;
+    return std::clamp(static_cast<int>(limits.usual_size_px) + 1, kMargin, room);
+}
+
 void load_window(const ImageView& image, Side side, const Component& component, std::span<const Run> runs,
-                 BlobWorkspace& w) {
-    w.left = std::max(0, component.left - kMargin);
-    w.top = std::max(0, component.top - kMargin);
-    w.width = std::min(image.width_px, component.right + 1 + kMargin) - w.left;
-    w.height = std::min(image.height_px, component.bottom + 1 + kMargin) - w.top;
+                 int margin, BlobWorkspace& w) {
+    w.left = std::max(0, component.left - margin);
+    w.top = std::max(0, component.top - margin);
+    w.width = std::min(image.width_px, component.right + 1 + margin) - w.left;
+    w.height = std::min(image.height_px, component.bottom + 1 + margin) - w.top;
     const std::uint8_t turn = side == Side::kAbove ? 255 : 0;
     const bool whole_vectors = w.left + static_cast<int>(BlobWorkspace::kPitch) <= image.width_px;
     for (int y = 0; y < w.height; ++y) {
@@ -385,18 +397,75 @@ void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, c
         return;
     }
     draw_moat(w.blob, w.width, w.height, w.moat);
-    const bool is_hidden = mark_hidden(w, fit.rms / blob.contrast, w.hidden);
+    blob.hidden = mark_hidden(w, fit.rms / blob.contrast, w.hidden);
     SoftMoments moments = soft_moments(w, outline);
-    if (is_hidden) moments = complete_moments(moments, w.hidden, w.height);
+    if (blob.hidden) moments = complete_moments(moments, w.hidden, w.height);
     if (moments.weight <= 0.0) {
         blob.rejection = Rejection::kSmall;
         return;
     }
-    moments = without_blur(moments);
     set_axes(moments, w.left, w.top, blob);
     blob.deviation = outline_deviation_px(w, moments, mean_radius_px(blob));
     blob.open = open_part(w);
     judge_shape(fit.rms, limits, blob);
+}
+
+bool has_odd_outline(const Blob& blob) {
+    return blob.rejection == Rejection::kIrregular ||
+           (blob.rejection == Rejection::kNone && blob.badness > kSureBadness);
+}
+
+bool is_piece(const BlobLimits& limits, const Blob& blob) {
+    const bool could_be = blob.rejection == Rejection::kNone || blob.rejection == Rejection::kSmall ||
+                          blob.rejection == Rejection::kIrregular || blob.rejection == Rejection::kOpen;
+    return could_be && (blob.hidden || blob.long_axis_px < kPieceSize * limits.usual_size_px) &&
+           blob.long_axis_px < kMostSize * limits.usual_size_px;
+}
+
+// The marker of which this blob shows a part, with a bite out of it or with something else at it, when there
+// is one; else the blob as it was.
+void complete_outline(const PlaneFit& fit, const BlobLimits& limits, bool of_pieces, BlobWorkspace& w,
+                      Blob& blob) {
+    Ellipse ellipse;
+    if (!follow_ellipse(w, kHalf, ellipse) || !keep_ellipse(ellipse, w)) return;
+    w.box = box_of(w.blob, 0, w.height);
+    draw_moat(w.blob, w.width, w.height, w.moat);
+    const SoftMoments seen = soft_moments(w, kHalf);
+    const SoftMoments moments = fill_moments(
+        seen, {1.0, ellipse.x, ellipse.y, ellipse.xx, ellipse.xy, ellipse.yy}, w.hidden, w.height);
+    if (moments.weight <= 0.0) return;
+    Blob whole = blob;
+    whole.completed = true;
+    set_axes(moments, w.left, w.top, whole);
+    whole.deviation = outline_deviation_px(w, moments, mean_radius_px(whole));
+    whole.open = open_part(w);
+    judge_shape(fit.rms, limits, whole);
+    whole.badness += kPartBadness * (1.0 - ellipse.followed);
+    const double size = whole.long_axis_px / limits.usual_size_px;
+    const bool short_one = of_pieces && blob.long_axis_px < kPieceSize * limits.usual_size_px;
+    const bool better = whole.badness < blob.badness || blob.rejection != Rejection::kNone || short_one;
+    if (size > kLeastSize && size < kMostSize && better && whole.rejection == Rejection::kNone) blob = whole;
+}
+
+// The same from all the paint around it that could be of the same marker.
+void join_pieces(Side side, const PlaneFit& fit, const BlobLimits& limits, double x, double y,
+                 BlobWorkspace& w, Blob& blob) {
+    const BitRows own = w.blob;
+    const BitBox own_box = w.box;
+    const BitRows hidden = w.hidden;
+    const double radius = kPieceReach * limits.usual_size_px;
+    mark_disc(x, y, radius, w, w.blob);
+    w.box = box_of(w.blob, 0, w.height);
+    if (w.box.top == w.box.bottom) return;
+    compute_cover(w, side, fit.plane, blob.contrast, kMoatReach);
+    w.blob = own;
+    w.box = own_box;
+    w.hidden.fill(0);
+    if (gather_pieces(x, y, radius, kHalf, w)) complete_outline(fit, limits, true, w, blob);
+    if (blob.completed) return;
+    w.blob = own;
+    w.box = own_box;
+    w.hidden = hidden;
 }
 
 }  // namespace
@@ -410,15 +479,31 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
         blob.rejection = Rejection::kLarge;
         return blob;
     }
-    load_window(image, side, component, runs, w);
+    load_window(image, side, component, runs, margin_of(std::max(width, height), limits), w);
     claim_foreign(component, siblings, w);
     PlaneFit fit;
     blob.rejection = outline_at_mid_contrast(side, component, limits, w, fit, blob);
-    if (blob.rejection != Rejection::kNone) return blob;
-    compute_cover(w, side, fit.plane, blob.contrast, kMoatReach);
-    measure_outline(image, fit, kHalf, limits, w, blob);
+    const bool several = blob.rejection == Rejection::kSeveral;
+    if (blob.rejection != Rejection::kNone && !several) return blob;
+    if (!several) {
+        compute_cover(w, side, fit.plane, blob.contrast, kMoatReach);
+        measure_outline(image, fit, kHalf, limits, w, blob);
+    }
+    if (may_be_completed(side, limits, blob)) {
+        if (several) {
+            std::fill_n(w.blob.begin(), w.height, std::uint64_t{0});
+            join_pieces(side, fit, limits, 0.5 * (component.left + component.right) - w.left,
+                        0.5 * (component.top + component.bottom) - w.top, w, blob);
+        } else if (is_piece(limits, blob)) {
+            join_pieces(side, fit, limits, blob.x_px - w.left, blob.y_px - w.top, w, blob);
+        }
+        if (!several && !blob.completed && has_odd_outline(blob)) {
+            compute_cover(w, side, fit.plane, blob.contrast, kRedrawReach + kMoatReach);
+            complete_outline(fit, limits, false, w, blob);
+        }
+    }
     Rejection reason = Rejection::kNone;
-    if (looks_shadowed(blob.rejection) && redraw_blob(w, kDeep, reason)) {
+    if (!blob.completed && looks_shadowed(blob.rejection) && redraw_blob(w, kDeep, reason)) {
         measure_outline(image, fit, kDeep, limits, w, blob);
         blob.badness += kDeepBadness;
     }

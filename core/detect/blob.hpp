@@ -34,9 +34,11 @@ struct BlobLimits {
     double max_diameter_px = 28.0;   // long axis
     double min_contrast = 10.0;      // grey levels
     double max_aspect = 4.5;         // long axis / short axis
-    double max_deviation_px = 0.14;  // mean distance of the outline from the ellipse of equal moments, plus
+    double max_deviation_px = 0.17;  // mean distance of the outline from the ellipse of equal moments, plus
     double max_deviation = 0.03;     // this part of the mean radius
     double max_open = 0.22;          // part of the moat that is not background
+    double usual_size_px = 0.0;      // long axis of the image's markers; 0: unknown, nothing is completed
+    double usual_depth = 0.0;        // of their depths
 };
 
 // The least pixels a disc of the least diameter shows above mid contrast, with a margin for blur.
@@ -51,12 +53,19 @@ struct Blob {
     double diameter_px = 0.0;   // of the disc of equal area
     double long_axis_px = 0.0;  // diameters of the ellipse of equal moments
     double short_axis_px = 0.0;
-    double contrast = 0.0;    // grey levels between blob and background
+    double xx = 0.0;  // second moments of that ellipse, px^2
+    double xy = 0.0;
+    double yy = 0.0;
+    bool hidden = false;     // something that is neither paint nor skin lies on it
+    bool completed = false;  // from a part of its outline
+    double contrast = 0.0;   // grey levels between blob and background
+    double snr = 0.0;        // contrast / rms of the surroundings about their plane, of a grey level at least
     double background = 0.0;  // grey level at the centre
     double deviation = 0.0;
     double open = 0.0;
     double depth =
         0.0;  // contrast / light: the part of the skin's light that the ink takes, or the paint adds
+    double slope = 0.0;    // edge_slope(); 0 while unknown
     double badness = 0.0;  // 0 = a perfect disc; 1 = as far off as any one limit allows
     double score = 0.0;    // 0..1, from badness and the other blobs of the image
     Rejection rejection = Rejection::kSmall;
@@ -82,7 +91,17 @@ struct BlobWorkspace {
     int height = 0;
 };
 
+inline constexpr double kSureBadness = 0.7;     // of a blob: below, nothing is wrong with it
+inline constexpr double kPieceSize = 0.85;      // in usual sizes: what is shorter may be a piece of a marker
 inline constexpr std::uint32_t kPeerAreas = 3;  // a sibling with a third of the blob's area is its equal
+
+// Whether a point lies in the ellipse of a blob.
+[[nodiscard]] inline bool is_inside(const Blob& blob, double x_px, double y_px) {
+    const double dx = x_px - blob.x_px;
+    const double dy = y_px - blob.y_px;
+    const double square = blob.yy * dx * dx - 2.0 * blob.xy * dx * dy + blob.xx * dy * dy;
+    return square < 4.0 * (blob.xx * blob.yy - blob.xy * blob.xy);
+}
 
 // What was cut out of the same larger component, the blob itself among it: markers that touch share the
 // pixels between them. Runs of each are in `grouped`. Both empty for a blob that stands alone.

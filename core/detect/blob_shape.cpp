@@ -11,9 +11,13 @@ namespace {
 constexpr double kMostBlurPx2 = 0.5;    // an edge some 3 px wide; more is shape and no blur
 constexpr double kAspectBadness = 0.3;  // of the flattest disc
 constexpr double kNoiseDeviationPx =
-    1.5;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
-constexpr double kSureSnr = 6.0;   // contrast / spread of the surroundings: less costs
+    2.2;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
+constexpr double kSureSnr = 5.0;   // contrast / spread of the surroundings: less costs
 constexpr double kLeastSnr = 2.5;  // below: no telling it from noise
+
+constexpr double kLongest = 1.7;         // of what a part of one may be in
+constexpr double kLeastInkDepth = 0.45;  // of it, in usual depths
+constexpr double kLeastRetroDepth = 0.25;
 
 }  // namespace
 
@@ -39,6 +43,9 @@ void set_axes(const SoftMoments& m, int left, int top, Blob& blob) {
     blob.y_px = top + m.y;
     blob.long_axis_px = 4.0 * sqrt(mean + spread);
     blob.short_axis_px = 4.0 * sqrt(std::max(mean - spread, 1.0 / 64.0));
+    blob.xx = m.xx;
+    blob.xy = m.xy;
+    blob.yy = m.yy;
     blob.diameter_px = 1.1283791670955126 * sqrt(m.weight);
 }
 
@@ -52,6 +59,7 @@ void judge_shape(double noise, const BlobLimits& limits, Blob& blob) {
     const double deviation_limit = limits.max_deviation_px + limits.max_deviation * mean_radius_px(blob) +
                                    kNoiseDeviationPx * noise_share;
     const double snr = 1.0 / noise_share;
+    blob.snr = snr;
     blob.badness = blob.deviation / deviation_limit + blob.open / limits.max_open +
                    kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) +
                    std::max(0.0, kSureSnr - snr) / kSureSnr;
@@ -69,6 +77,12 @@ void judge_shape(double noise, const BlobLimits& limits, Blob& blob) {
     } else if (blob.deviation > deviation_limit) {
         blob.rejection = Rejection::kIrregular;
     }
+}
+
+bool may_be_completed(Side side, const BlobLimits& limits, const Blob& blob) {
+    const double least = side == Side::kBelow ? kLeastInkDepth : kLeastRetroDepth;
+    return limits.usual_size_px > 0.0 && blob.depth > least * limits.usual_depth &&
+           blob.long_axis_px < kLongest * limits.usual_size_px;
 }
 
 bool looks_shadowed(Rejection rejection) {

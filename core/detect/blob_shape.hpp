@@ -15,8 +15,9 @@ struct SoftMoments {
     double yy = 0.0;
 };
 
-// A soft edge adds the same variance in every direction: it makes small or flat markers look larger and
-// rounder than their outline. Taken off until the ellipse of these moments has the area of the weights.
+// A soft edge adds the same variance in every direction: the ellipse of equal moments lies outside the
+// outline of small or flat markers. Taken off until the ellipse has the area of the weights: for comparing it
+// with the outline.
 [[nodiscard]] SoftMoments without_blur(SoftMoments m);
 // Centre, axes and diameter of the ellipse of equal moments; (left, top) is where the moments' window begins.
 void set_axes(const SoftMoments& moments, int left, int top, Blob& blob);
@@ -36,6 +37,9 @@ inline constexpr double kSoftRamp =
     0.25;  // weights rise from 0 to 1 from this much before an outline to after it
 inline constexpr double kHiddenCover = 0.4;   // beyond the skin, the other way: neither paint nor skin
 inline constexpr double kDeepBadness = 0.25;  // of a marker that only shows at the deep outline
+
+// Worth completing: of the paint of the image's markers, and not so long that no marker is in it.
+[[nodiscard]] bool may_be_completed(Side side, const BlobLimits& limits, const Blob& blob);
 
 // Refused for what shadow does to an outline: worth another look at the deep one.
 [[nodiscard]] bool looks_shadowed(Rejection rejection);

@@ -124,8 +124,9 @@ bool Detector::search_window(const ImageView& image, Side side, const ExpectedMa
     const double largest = largest_marker(state_.usual_size_px);
     set_thresholds(means, thresholds, side, largest);
     threshold_bits(part, thresholds, side, w.window);
-    const Search search{image,       thresholds, side,         largest,
-                        window.left, window.top, window.right, window.bottom};
+    const Search search{
+        image, thresholds,  side,       largest,      state_.usual_size_px, state_.usual_depth,
+        false, window.left, window.top, window.right, window.bottom};
     const std::size_t before = result.blobs.size();
     if (!examine_window(search, expected, result)) return false;
     const bool found = std::any_of(result.blobs.begin(), result.blobs.end(), [&](const Blob& blob) {
@@ -216,7 +217,7 @@ bool Detector::search_windows(const ImageView& image, Side side, std::span<const
     for (const ExpectedMarker& marker : expected) {
         if (is_usable(marker) && !search_window(image, side, marker, result)) return false;
     }
-    apply_population(side, result);
+    apply_population(image, side, result);
     std::size_t sure = 0;
     std::size_t met = 0;
     for (const ExpectedMarker& marker : expected) {

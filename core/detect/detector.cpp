@@ -4,6 +4,7 @@
 
 #include "core/base/math.hpp"
 #include "core/detect/components.hpp"
+#include "core/detect/edge_slope.hpp"
 #include "core/image/kernels.hpp"
 #include "core/image/pixel_lanes.hpp"
 
@@ -18,8 +19,10 @@ constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
                                                            0.75};  // of a component's own range of grey
 constexpr double kFringe = 4.0;           // px by which blur and noise lengthen a component
 constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual marker
-constexpr double kSureBadness = 0.7;      // below: good enough to say what the markers of this image are like
 constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
+constexpr std::uint32_t kSparse = 2;      // boxes are that much larger than what is in them
+constexpr double kDimmest = 0.4;          // of the least contrast, in a dim image
+constexpr double kTriedSizes = 1.5;       // long components are no one marker
 constexpr double kHopelessBadness = 1.5;  // score 0
 
 // Sixteen pixels of a row from x on; beyond the image, zeros.
@@ -114,6 +117,10 @@ std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span
     });
 }
 
+int length_of(const Component& component) {
+    return std::max(component.right - component.left, component.bottom - component.top) + 1;
+}
+
 // Whether the middle of a component's box is part of it.
 bool holds_its_middle(const Component& component, std::span<const Run> runs) {
     const int x = (component.left + component.right + 1) / 2;
@@ -157,8 +164,9 @@ Result<void, DetectorError> Detector::configure(const DetectorConfig& config) {
     }
     if (!in_range(blob.max_aspect, 1.01, 100.0) || !in_range(blob.max_deviation, 0.0, 1.0) ||
         !in_range(blob.max_deviation_px, 0.01, 10.0) || !in_range(blob.max_open, 0.01, 1.0) ||
-        !in_range(config.size_ratio, 1.01, 100.0) || !in_range(config.ink_spread, 0.01, 100.0) ||
-        !in_range(config.retro_spread, 0.01, 100.0) || config.size_quorum < 3) {
+        !in_range(config.population.size_ratio, 1.31, 100.0) ||
+        !in_range(config.population.ink_spread, 0.01, 100.0) ||
+        !in_range(config.population.retro_spread, 0.01, 100.0) || config.population.quorum < 3) {
         return failure(DetectorError::kShape);
     }
     if (!in_range(config.min_score, 0.0, 1.0)) return failure(DetectorError::kScore);
@@ -175,6 +183,7 @@ void Detector::measure_exposure(const ImageView& image, DetectorReport& report) 
     const LumaSums sums = luma_sums(image, kLumaRows);
     report.mean_luma = static_cast<double>(sums.sum) / sums.samples;
     report.saturated_fraction = static_cast<double>(sums.saturated) / sums.samples;
+    state_.luma = report.mean_luma;
     if (report.mean_luma < config_.dark_luma)
         report.exposure |= static_cast<std::uint8_t>(ExposureFlag::kDark);
     if (report.saturated_fraction > config_.saturated_fraction) {
@@ -192,13 +201,20 @@ void Detector::measure_exposure(const ImageView& image, DetectorReport& report) 
     if (report.exposure != 0) report.faults |= fault_bit(Fault::kExposure);
 }
 
+// In an image with little light all contrasts are small, and so is its noise.
+double Detector::least_contrast(Side side) const {
+    const double enough = side == Side::kBelow ? config_.dim_luma_ink : config_.dim_luma_retro;
+    const double part = state_.luma < 0.0 ? 1.0 : state_.luma / enough;
+    return config_.blob.min_contrast * std::clamp(part, kDimmest, 1.0);
+}
+
 // The background is what remains when everything narrower than the largest disc is taken away (a closing for
 // dark discs, an opening for bright ones); a pixel is a candidate when it differs from it by a part of it.
 void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side,
                               double largest_px) {
     std::copy(means.values.begin(), means.values.end(), thresholds.values.begin());
     const int radius = (static_cast<int>(largest_px) / static_cast<int>(kBlockPx) + 2) / 2;
-    const int least = static_cast<int>(config_.blob.min_contrast);
+    const int least = static_cast<int>(least_contrast(side));
     const int part = static_cast<int>(config_.relative_contrast * 256.0);
     if (side == Side::kBelow) {
         sliding_max(thresholds, radius, workspace_.slide);
@@ -212,7 +228,7 @@ void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& threshold
 
 // Texture and noise just reach the threshold; a marker whose mid contrast does has pixels well beyond it.
 bool Detector::has_core(const Search& search, std::span<const Run> runs) const {
-    const int least = static_cast<int>(config_.blob.min_contrast);
+    const int least = static_cast<int>(least_contrast(search.side));
     const int part = static_cast<int>(config_.relative_contrast * 256.0);
     const int whole = search.side == Side::kBelow ? 256 - part : 256 + part;
     const int sign = search.side == Side::kBelow ? 1 : -1;
@@ -250,31 +266,68 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
         connect(std::span<const Run>(w.runs).first(count), {least_area_px(config_.blob)},
                 {w.labels, w.label_of, w.grouped, w.components});
     result.report.blobs_full = counts.dropped > 0;
-    const Search search{image, thresholds, side, largest, 0, 0, image.width_px, image.height_px};
+    const bool follows = !(state_.usual_size_px > 0.0);
+    const Search search{image,   thresholds, side, largest,        state_.usual_size_px, state_.usual_depth,
+                        follows, 0,          0,    image.width_px, image.height_px};
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& component = w.components[c];
-        if (examine(search, component, members_of(component, w.grouped), {}, result)) continue;
+        const std::size_t before = result.blobs.size();
+        if (examine(search, component, members_of(component, w.grouped), {}, result)) {
+            if (result.blobs.size() > before) w.origins[before] = static_cast<std::uint16_t>(c);
+            continue;
+        }
         if (!w.failed.push_back(static_cast<std::uint16_t>(c))) result.report.blobs_full = true;
     }
     split_failed(search, means, result);
-    apply_population(side, result);
+    apply_population(image, side, result);
 }
 
 // Blobs that are no markers may hold some: a marker hangs together with a shadow, a strip of light or another
 // marker. Now that the size of the image's markers is known, the background is taken at that scale.
 void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResult& result) {
     Workspace& w = workspace_;
-    if (w.failed.empty()) return;
-    const double largest = state_.usual_size_px > 0.0
-                               ? wide.largest_px
-                               : largest_marker(usual(&Blob::long_axis_px, result.blobs));
+    if (w.failed.empty() && !wide.size_follows) return;
+    double usual = wide.usual_size_px;
+    double depth = wide.usual_depth;
+    if (wide.size_follows) {
+        const Population population = population_of(result.blobs.span(), config_.population.quorum);
+        usual = population.size_px;
+        depth = population.depth;
+    }
+    const double largest = largest_marker(usual);
     const bool narrower = largest < wide.largest_px;
     if (narrower) set_thresholds(means, wide.thresholds, wide.side, largest);
-    const Search search{wide.image, wide.thresholds, wide.side,  largest,
-                        wide.left,  wide.top,        wide.right, wide.bottom};
+    const Search search{wide.image, wide.thresholds, wide.side, largest,    usual,      depth,
+                        false,      wide.left,       wide.top,  wide.right, wide.bottom};
+    if (wide.size_follows) examine_pieces(search, result);
     for (const std::uint16_t c : w.failed) {
         const Component& component = w.components[c];
-        split(search, narrower ? 0 : 1, component, members_of(component, w.grouped), result);
+        const std::span<const Run> runs = members_of(component, w.grouped);
+        if (wide.size_follows && examine(search, component, runs, {}, result)) continue;
+        // What a marker may be a part of was tried as a whole; then its own parts are not.
+        Search inner = search;
+        if (length_of(component) < kTriedSizes * usual) inner.usual_size_px = 0.0;
+        split(inner, narrower ? 0 : 1, component, runs, result);
+    }
+}
+
+// What is too short for a marker of the image was measured before that was known.
+void Detector::examine_pieces(const Search& search, SideResult& result) {
+    Workspace& w = workspace_;
+    std::size_t kept = 0;
+    BoundedVector<std::uint16_t, kMaxBlobs> pieces;
+    for (std::size_t i = 0; i < result.blobs.size(); ++i) {
+        if (result.blobs[i].long_axis_px < kPieceSize * search.usual_size_px) {
+            if (pieces.push_back(w.origins[i])) continue;
+        }
+        result.blobs[kept++] = result.blobs[i];
+    }
+    result.blobs.resize(kept);
+    for (const std::uint16_t c : pieces) {
+        const Component& component = w.components[c];
+        if (!examine(search, component, members_of(component, w.grouped), {}, result)) {
+            if (!w.failed.push_back(c)) result.report.blobs_full = true;
+        }
     }
 }
 
@@ -286,24 +339,34 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         reject(Rejection::kFaint);
         return true;
     }
-    const int longest = std::max(component.right - component.left, component.bottom - component.top) + 1;
+    const int longest = length_of(component);
     if (longest > search.largest_px + kFringe) {
         reject(Rejection::kLarge);
         return false;
     }
+    BlobLimits limits = config_.blob;
+    limits.usual_size_px = search.usual_size_px;
+    limits.usual_depth = search.usual_depth;
+    limits.min_contrast = least_contrast(search.side);
     Blob blob;
     QuickStart start;
     const bool alone = stands_alone(component, siblings) && holds_its_middle(component, runs) &&
                        frame_component(search.image, component, start);
-    if (!alone || !measure_quickly(search.image, search.side, start, config_.blob, workspace_.quick, blob)) {
-        blob =
-            measure_blob(search.image, search.side, component, runs, siblings, config_.blob, workspace_.blob);
+    const bool quick =
+        alone && measure_quickly(search.image, search.side, start, limits, workspace_.quick, blob);
+    if (!quick || blob.long_axis_px < kPieceSize * limits.usual_size_px) {
+        blob = measure_blob(search.image, search.side, component, runs, siblings, limits, workspace_.blob);
     }
     ++result.report.candidates;
     if (blob.rejection != Rejection::kNone) {
         reject(blob.rejection);
-        return blob.rejection == Rejection::kSmall || blob.rejection == Rejection::kFaint;
+        const auto box = static_cast<std::uint32_t>((component.right - component.left + 1) *
+                                                    (component.bottom - component.top + 1));
+        const bool sparse = component.area_px * kSparse < box;  // something deep, and shade around it
+        return blob.rejection == Rejection::kSmall || (blob.rejection == Rejection::kFaint && !sparse);
     }
+    // Another look once the size of the image's markers is known.
+    if (search.size_follows && blob.badness > kSureBadness) return false;
     if (!result.blobs.push_back(blob)) result.report.blobs_full = true;
     return true;
 }
@@ -339,32 +402,38 @@ double Detector::largest_marker(double usual_size_px) const {
                                : config_.blob.max_diameter_px;
 }
 
-// Median over the sure markers of an image; 0 when they are too few.
-double Detector::usual(double Blob::* property, const Blobs& blobs) const {
-    std::array<float, kMaxCandidates> values{};
-    std::size_t count = 0;
-    for (const Blob& blob : blobs) {
-        if (blob.badness < kSureBadness) values[count++] = static_cast<float>(blob.*property);
+// A completed marker and its pieces, or the same one completed from two pieces: the best one stays.
+void Detector::drop_pieces(SideResult& result) {
+    for (std::size_t i = 0; i < result.blobs.size(); ++i) {
+        Blob& whole = result.blobs[i];
+        if (!whole.completed) continue;
+        for (std::size_t k = 0; k < result.blobs.size(); ++k) {
+            Blob& other = result.blobs[k];
+            if (k == i ||
+                !(is_inside(whole, other.x_px, other.y_px) || is_inside(other, whole.x_px, whole.y_px)))
+                continue;
+            const bool worse = other.badness > whole.badness || (other.badness == whole.badness && k > i);
+            (worse ? other : whole).badness += 2.0 * kHopelessBadness;
+        }
     }
-    return count < config_.size_quorum ? 0.0 : ranked(std::span(values).first(count), count / 2);
 }
 
-// The markers of one image are of one make: sizes and depths of ink far from the median are eyes, nostrils,
-// teeth, moles or shadows. Without enough sure markers nothing is said.
-void Detector::apply_population(Side side, SideResult& result) const {
-    const double size = usual(&Blob::long_axis_px, result.blobs);
-    const double depth = usual(&Blob::depth, result.blobs);
-    const double spread = side == Side::kBelow ? config_.ink_spread : config_.retro_spread;
+// The markers of one image are of one make: what is unlike them is an eye, a nostril, a tooth, a mole or a
+// shadow.
+void Detector::apply_population(const ImageView& image, Side side, SideResult& result) const {
+    for (Blob& blob : result.blobs) {
+        const bool matters = side == Side::kBelow && blob.badness < kHopelessBadness;
+        if (matters && blob.short_axis_px > kLeastSlopeWidthPx) blob.slope = edge_slope(image, side, blob);
+    }
+    const Population population = population_of(result.blobs.span(), config_.population.quorum);
+    result.usual_size_px = population.size_px;
+    result.usual_depth = population.depth;
     result.quality = 0.0;
     for (Blob& blob : result.blobs) {
-        if (size > 0.0) {
-            const double ratio =
-                blob.long_axis_px > size ? blob.long_axis_px / size : size / blob.long_axis_px;
-            blob.badness += std::max(0.0, ratio - 1.0) / (config_.size_ratio - 1.0);
-        }
-        if (depth > 0.0 && blob.depth < depth) {
-            blob.badness += (depth - blob.depth) / (depth * spread);
-        }
+        blob.badness += oddness(population, config_.population, side, blob);
+    }
+    drop_pieces(result);
+    for (Blob& blob : result.blobs) {
         blob.score = std::clamp(1.0 - blob.badness / kHopelessBadness, 0.0, 1.0);
         result.quality += blob.score * std::min(1.0, blob.contrast / 40.0);
     }
@@ -471,7 +540,8 @@ void Detector::detect(const ImageView& image, Observations& observations, Detect
 void Detector::finish(std::size_t side, Observations& observations, DetectorReport& report) {
     const SideResult& result = workspace_.sides[side];
     report.polarity = side == 0 ? MarkerPolarity::kDark : MarkerPolarity::kBright;
-    state_.usual_size_px = usual(&Blob::long_axis_px, result.blobs);
+    state_.usual_size_px = result.usual_size_px;
+    state_.usual_depth = result.usual_depth;
     hand_on(result, observations, report);
     measure_markers(result, report);
     if (report.runs_full || report.blobs_full || report.observations_full) {

@@ -12,6 +12,7 @@
 #include "core/base/result.hpp"
 #include "core/detect/blob.hpp"
 #include "core/detect/observation.hpp"
+#include "core/detect/population.hpp"
 #include "core/detect/quick_blob.hpp"
 #include "core/image/view.hpp"
 #include "core/limits.hpp"
@@ -23,10 +24,9 @@ struct DetectorConfig {
     BlobLimits blob;                  // see there: diameters, contrast, shape
     double relative_contrast = 0.25;  // of the background, that a pixel needs to belong to a candidate
     double min_score = 0.15;          // 0..1, below which a blob is not handed on
-    double size_ratio = 1.75;         // long axis against the median of the image: one unit of badness
-    double ink_spread = 0.6;    // part of the median depth that a dark marker may lack: one unit of badness;
-    double retro_spread = 1.2;  // of a bright one, whose return falls with the angle
-    std::uint16_t size_quorum = 8;     // markers needed before that median says anything
+    PopulationLimits population;      // how far from the other markers of the image
+    double dim_luma_ink = 24.0;  // mean grey level below which dark markers may have less than min_contrast,
+    double dim_luma_retro = 12.0;      // and bright ones
     double dark_luma = 4.0;            // mean grey level below which the image is called dark (F13)
     double saturated_fraction = 0.25;  // of 255s, above which it is called flooded (F13)
     double luma_step = 0.4;  // change of the mean, relative to the usual, that is called a step (F13)
@@ -105,8 +105,11 @@ class Detector {
         const ImageView& image;
         const BlockGrid& thresholds;
         Side side;
-        double largest_px;  // longest marker
-        int left;           // px: what is looked at, and where the thresholds' grid begins
+        double largest_px;     // longest marker
+        double usual_size_px;  // long axis of the image's markers; 0: unknown,
+        double usual_depth;    // of their depths; 0: unknown
+        bool size_follows;     // for now
+        int left;              // px: what is looked at, and where the thresholds' grid begins
         int top;
         int right;  // exclusive
         int bottom;
@@ -134,7 +137,9 @@ class Detector {
         MarkerPolarity polarity = MarkerPolarity::kAuto;  // the last decision
         std::uint8_t agreed = 0;                          // frames in a row that said so
         double usual_size_px = 0.0;                       // long axis; 0 while unknown
-        double usual_luma = -1.0;                         // running mean; negative before the first frame
+        double usual_depth = 0.0;
+        double luma = -1.0;        // of the last frame that was looked at whole or in parts; negative before
+        double usual_luma = -1.0;  // running mean; negative before the first frame
     };
 
     using Blobs = BoundedVector<Blob, kMaxCandidates>;
@@ -146,6 +151,8 @@ class Detector {
         Blobs blobs;
         DetectorReport report;
         double quality = 0.0;
+        double usual_size_px = 0.0;  // long axis; 0 when the markers are too few
+        double usual_depth = 0.0;
     };
 
     struct SplitStorage {
@@ -165,8 +172,9 @@ class Detector {
         std::array<Component, kMaxBlobs> components{};
         std::array<SplitStorage, kSplitLevels> split{};
         BoundedVector<std::uint16_t, kMaxBlobs> failed;
-        BoundedVector<Component, kMaxCandidates> examined;  // by earlier windows of the frame
-        BitRows window{};                                   // beyond the threshold, not examined yet
+        std::array<std::uint16_t, kMaxCandidates> origins{};  // component of each blob of the first pass
+        BoundedVector<Component, kMaxCandidates> examined;    // by earlier windows of the frame
+        BitRows window{};                                     // beyond the threshold, not examined yet
         BitRows reach{};
         BitRows part{};
         BlobWorkspace blob;
@@ -174,6 +182,7 @@ class Detector {
         std::array<SideResult, 2> sides;
     };
 
+    [[nodiscard]] double least_contrast(Side side) const;
     void measure_exposure(const ImageView& image, DetectorReport& report);
     void set_thresholds(const BlockGrid& means, const BlockGrid& thresholds, Side side, double largest_px);
     void detect_side(const ImageView& image, const BlockGrid& means, Side side, SideResult& result);
@@ -189,6 +198,8 @@ class Detector {
     [[nodiscard]] bool is_settled() const;
     [[nodiscard]] std::size_t likely_side() const;
     void finish(std::size_t side, Observations& observations, DetectorReport& report);
+    void examine_pieces(const Search& search, SideResult& result);
+    static void drop_pieces(SideResult& result);
     void split_failed(const Search& wide, const BlockGrid& means, SideResult& result);
     [[nodiscard]] double largest_marker(double usual_size_px) const;
     void split(const Search& search, std::size_t level, const Component& component, std::span<const Run> runs,
@@ -196,8 +207,7 @@ class Detector {
     [[nodiscard]] bool examine(const Search& search, const Component& component, std::span<const Run> runs,
                                const Siblings& siblings, SideResult& result);
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
-    [[nodiscard]] double usual(double Blob::* property, const Blobs& blobs) const;
-    void apply_population(Side side, SideResult& result) const;
+    void apply_population(const ImageView& image, Side side, SideResult& result) const;
     [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);
     void decide(std::size_t dark_or_bright);
     void measure_markers(const SideResult& result, DetectorReport& report) const;

@@ -106,4 +106,13 @@ SoftMoments complete_moments(const SoftMoments& seen, const BitRows& hidden, int
     return whole;
 }
 
+SoftMoments fill_moments(const SoftMoments& seen, const SoftMoments& ellipse, const BitRows& hidden,
+                         int height) {
+    if (seen.weight <= 0.0) return seen;
+    const Sums known = sums_of(seen);
+    const Sums more = hidden_sums(ellipse, hidden, height);
+    return moments_of({known.w + more.w, known.x + more.x, known.y + more.y, known.xx + more.xx,
+                       known.xy + more.xy, known.yy + more.yy});
+}
+
 }  // namespace rig

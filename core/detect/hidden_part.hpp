@@ -18,4 +18,8 @@ namespace rig {
 // ellipse would be hidden. Both are in pixels of the window; hidden reaches no farther than its height.
 [[nodiscard]] SoftMoments complete_moments(const SoftMoments& seen, const BitRows& hidden, int height);
 
+// The same when the ellipse is known: hidden pixels take the weight that it gives them.
+[[nodiscard]] SoftMoments fill_moments(const SoftMoments& seen, const SoftMoments& ellipse,
+                                       const BitRows& hidden, int height);
+
 }  // namespace rig

@@ -484,13 +484,13 @@ double QuickMeasure::open_part(double contrast) const {
 }
 
 void QuickMeasure::judge(double outline, Blob& blob) {
-    const SoftMoments m = without_blur(moments(outline, blob.contrast));
+    const SoftMoments m = moments(outline, blob.contrast);
     if (m.weight <= 0.0) {
         blob.rejection = Rejection::kSmall;
         return;
     }
     set_axes(m, s_.left, s_.top, blob);
-    blob.deviation = deviation_px(m, mean_radius_px(blob));
+    blob.deviation = deviation_px(without_blur(m), mean_radius_px(blob));
     blob.open = open_part(blob.contrast);
     judge_shape(rms_, limits_, blob);
 }

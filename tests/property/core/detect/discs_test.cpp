@@ -32,9 +32,13 @@ struct Found {
     }
 };
 
-test::DiscSceneConfig scene(std::uint64_t k, bool bright, Disturbance disturbance) {
+constexpr std::uint64_t kSeeds = 4000;   // in sight while the detector was improved
+constexpr std::uint64_t kFresh = 50021;  // looked at when it was done
+
+test::DiscSceneConfig scene(std::uint64_t k, bool bright, Disturbance disturbance,
+                            std::uint64_t seeds = kSeeds) {
     test::DiscSceneConfig config;
-    config.seed = 4000 + 31 * k;
+    config.seed = seeds + (seeds == kSeeds ? 31 : 41) * k;
     config.bright = bright;
     config.disturbance = disturbance;
     config.head_radius_mm = 60.0 + static_cast<double>(7 * k % 31);
@@ -206,54 +210,66 @@ TEST(Discs, CentresOnceEachMarkersOffsetIsLearnt) {
     }
 }
 
-struct Case {
-    Disturbance disturbance;
-    bool bright;
+struct Bounds {
     double least_recall;
     double least_precision;
     double most_rms_px;
 };
 
+struct Case {
+    Disturbance disturbance;
+    bool bright;
+    Bounds seen;   // for the seeds that were in sight
+    Bounds fresh;  // for others
+};
+
 class Disturbances : public testing::TestWithParam<Case> {};
 
-TEST_P(Disturbances, MarkersAreFoundAndNothingElse) {
-    const Case& c = GetParam();
+void check(const Case& c, std::uint64_t seeds, const Bounds& bounds) {
     Found found;
-    for (std::uint64_t k = 0; k < 12; ++k) look_at(scene(k, c.bright, c.disturbance), found);
+    for (std::uint64_t k = 0; k < 12; ++k) look_at(scene(k, c.bright, c.disturbance, seeds), found);
     std::printf(
-        "    %-6s %-16s %4zu discs, recall %.4f, precision %.4f (%zu false), rms %.3f px, largest %.2f px\n",
-        c.bright ? "bright" : "dark", test::name_of(c.disturbance), found.counts.expected,
-        found.counts.recall(), found.counts.precision(), found.counts.seen - found.counts.right,
-        found.counts.rms_px(), found.counts.largest_error_px);
+        "    %-6s %-16s %s %4zu discs, recall %.4f, precision %.4f (%zu false), rms %.3f px, largest %.2f "
+        "px\n",
+        c.bright ? "bright" : "dark", test::name_of(c.disturbance), seeds == kFresh ? "fresh" : "seen ",
+        found.counts.expected, found.counts.recall(), found.counts.precision(),
+        found.counts.seen - found.counts.right, found.counts.rms_px(), found.counts.largest_error_px);
     EXPECT_GT(found.counts.expected, 300U);
-    EXPECT_GE(found.counts.recall(), c.least_recall);
-    EXPECT_GE(found.counts.precision(), c.least_precision);
-    EXPECT_LE(found.counts.rms_px(), c.most_rms_px);
+    EXPECT_GE(found.counts.recall(), bounds.least_recall);
+    EXPECT_GE(found.counts.precision(), bounds.least_precision);
+    EXPECT_LE(found.counts.rms_px(), bounds.most_rms_px);
 }
 
-// Bounds: the last run less three or four discs. What is asked for is recall 0.995 and precision 0.999.
-INSTANTIATE_TEST_SUITE_P(Kinds, Disturbances,
-                         testing::Values(Case{Disturbance::kGlintsOnDiscs, false, 0.949, 0.999, 0.11},
-                                         Case{Disturbance::kGlintsOnSkin, false, 0.984, 0.999, 0.15},
-                                         Case{Disturbance::kStreaks, false, 0.987, 0.999, 0.27},
-                                         Case{Disturbance::kHighlights, false, 0.989, 0.999, 0.26},
-                                         Case{Disturbance::kNostrils, false, 0.994, 0.978, 0.08},
-                                         Case{Disturbance::kLashes, false, 0.995, 0.999, 0.10},
-                                         Case{Disturbance::kLipShadow, false, 0.980, 0.999, 0.09},
-                                         Case{Disturbance::kMotion, false, 0.995, 0.999, 0.09},
-                                         Case{Disturbance::kOverexposed, false, 0.989, 0.999, 0.08},
-                                         Case{Disturbance::kUnderexposed, false, 0.897, 0.999, 0.13},
-                                         Case{Disturbance::kEverything, false, 0.905, 0.982, 0.42},
-                                         Case{Disturbance::kGlintsOnDiscs, true, 0.995, 0.999, 0.11},
-                                         Case{Disturbance::kGlintsOnSkin, true, 0.944, 0.994, 0.21},
-                                         Case{Disturbance::kStreaks, true, 0.989, 0.999, 0.13},
-                                         Case{Disturbance::kHighlights, true, 0.973, 0.999, 0.13},
-                                         Case{Disturbance::kNostrils, true, 0.995, 0.999, 0.11},
-                                         Case{Disturbance::kLashes, true, 0.995, 0.999, 0.12},
-                                         Case{Disturbance::kLipShadow, true, 0.995, 0.999, 0.16},
-                                         Case{Disturbance::kMotion, true, 0.988, 0.999, 0.12},
-                                         Case{Disturbance::kOverexposed, true, 0.995, 0.999, 0.09},
-                                         Case{Disturbance::kUnderexposed, true, 0.802, 0.999, 0.15},
-                                         Case{Disturbance::kEverything, true, 0.926, 0.993, 0.29}));
+TEST_P(Disturbances, MarkersAreFoundAndNothingElse) {
+    check(GetParam(), kSeeds, GetParam().seen);
+    check(GetParam(), kFresh, GetParam().fresh);
+}
+
+// Asked: recall 0.995, precision 0.999. Where that does not hold, the last run less two or three discs. The
+// rms is of all that is found, half-hidden ones among them.
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, Disturbances,
+    testing::Values(Case{Disturbance::kGlintsOnDiscs, false, {0.990, 0.999, 0.11}, {0.990, 0.999, 0.11}},
+                    Case{Disturbance::kGlintsOnSkin, false, {0.995, 0.999, 0.17}, {0.995, 0.999, 0.15}},
+                    Case{Disturbance::kStreaks, false, {0.995, 0.999, 0.22}, {0.995, 0.999, 0.23}},
+                    Case{Disturbance::kHighlights, false, {0.995, 0.999, 0.36}, {0.995, 0.999, 0.25}},
+                    Case{Disturbance::kNostrils, false, {0.995, 0.994, 0.08}, {0.995, 0.993, 0.09}},
+                    Case{Disturbance::kLashes, false, {0.995, 0.999, 0.10}, {0.990, 0.999, 0.09}},
+                    Case{Disturbance::kLipShadow, false, {0.981, 0.999, 0.10}, {0.988, 0.999, 0.10}},
+                    Case{Disturbance::kMotion, false, {0.995, 0.999, 0.09}, {0.995, 0.999, 0.10}},
+                    Case{Disturbance::kOverexposed, false, {0.995, 0.999, 0.09}, {0.995, 0.999, 0.09}},
+                    Case{Disturbance::kUnderexposed, false, {0.995, 0.999, 0.15}, {0.995, 0.999, 0.14}},
+                    Case{Disturbance::kEverything, false, {0.977, 0.991, 0.47}, {0.980, 0.988, 0.30}},
+                    Case{Disturbance::kGlintsOnDiscs, true, {0.995, 0.999, 0.11}, {0.995, 0.999, 0.11}},
+                    Case{Disturbance::kGlintsOnSkin, true, {0.983, 0.994, 0.39}, {0.978, 0.993, 0.37}},
+                    Case{Disturbance::kStreaks, true, {0.995, 0.999, 0.12}, {0.985, 0.999, 0.18}},
+                    Case{Disturbance::kHighlights, true, {0.974, 0.999, 0.12}, {0.974, 0.999, 0.13}},
+                    Case{Disturbance::kNostrils, true, {0.995, 0.999, 0.11}, {0.995, 0.999, 0.11}},
+                    Case{Disturbance::kLashes, true, {0.995, 0.999, 0.12}, {0.995, 0.999, 0.12}},
+                    Case{Disturbance::kLipShadow, true, {0.995, 0.999, 0.15}, {0.995, 0.999, 0.19}},
+                    Case{Disturbance::kMotion, true, {0.995, 0.999, 0.13}, {0.995, 0.999, 0.12}},
+                    Case{Disturbance::kOverexposed, true, {0.995, 0.999, 0.09}, {0.995, 0.999, 0.09}},
+                    Case{Disturbance::kUnderexposed, true, {0.981, 0.999, 0.22}, {0.986, 0.999, 0.21}},
+                    Case{Disturbance::kEverything, true, {0.977, 0.999, 0.38}, {0.957, 0.991, 0.42}}));
 
 }  // namespace

@@ -50,7 +50,7 @@ TEST_F(DetectorTest, ConfigurationsOutOfRangeAreRefusedByName) {
               static_cast<int>(DetectorError::kContrast));
     EXPECT_EQ(error_of([](DetectorConfig& c) { c.blob.max_open = 0.0; }),
               static_cast<int>(DetectorError::kShape));
-    EXPECT_EQ(error_of([](DetectorConfig& c) { c.size_ratio = kNan; }),
+    EXPECT_EQ(error_of([](DetectorConfig& c) { c.population.size_ratio = kNan; }),
               static_cast<int>(DetectorError::kShape));
     EXPECT_EQ(error_of([](DetectorConfig& c) { c.min_score = 1.5; }),
               static_cast<int>(DetectorError::kScore));
@@ -97,6 +97,23 @@ TEST_F(DetectorTest, LightAtTheMarkersIsMeasuredForExposureControl) {
     detect(grey(64, 64, 100));
     EXPECT_EQ(report.brightest_level, 0.0);
     EXPECT_EQ(report.faintest_contrast, 0.0);
+}
+
+TEST_F(DetectorTest, FaintMarkersOfADimImageAreFound) {
+    for (const bool bright : {false, true}) {
+        test::Scene scene = test::lattice_scene(12, 1.2, bright, 4);
+        scene.light = {.skin = bright ? 4.0 : 12.0,
+                       .gradient = 0.0,
+                       .vignetting = 0.0,
+                       .texture = 0.0,
+                       .read_noise = 1.0,
+                       .shot_noise = 0.0};
+        for (test::SceneDot& dot : scene.dots) dot.paint = bright ? 2.8 : 0.35;  // 7 or 8 grey levels
+        detector->reset();
+        detect(test::render(scene));
+        EXPECT_GE(observations.size(), scene.dots.size() * 98 / 100) << bright;
+        EXPECT_LE(observations.size(), scene.dots.size()) << bright;
+    }
 }
 
 TEST_F(DetectorTest, ExposureFlagsFollowTheCatalogue) {

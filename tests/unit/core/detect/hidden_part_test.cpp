@@ -61,6 +61,17 @@ TEST(HiddenPart, AHiddenCornerIsCompletedToTheWholeEllipse) {
     }
 }
 
+TEST(HiddenPart, AKnownEllipseFillsWhatIsHidden) {
+    const Ellipse e;
+    const SoftMoments whole = moments_without(e, {});
+    const BitRows hidden = box(16, 20, 26, 26);
+    const SoftMoments filled = fill_moments(moments_without(e, hidden), whole, hidden, 48);
+    EXPECT_NEAR(filled.x, whole.x, 0.05);
+    EXPECT_NEAR(filled.y, whole.y, 0.05);
+    EXPECT_NEAR(filled.weight, whole.weight, 0.03 * whole.weight);
+    EXPECT_EQ(fill_moments({}, whole, hidden, 48).weight, 0.0);
+}
+
 TEST(HiddenPart, NothingHiddenChangesNothing) {
     const SoftMoments whole = moments_without({}, {});
     const SoftMoments done = complete_moments(whole, {}, 48);
