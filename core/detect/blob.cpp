@@ -300,7 +300,7 @@ SoftMoments soft_moments(BlobWorkspace& w, int outline) {
     copy_rows(w.blob, w.height, region);
     grow_square(region, w.height);
     for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y)
-        region[y] &= ~w.foreign[y] & ~w.hidden[y];
+        region[y] &= row_mask(w.width) & ~w.foreign[y] & ~w.hidden[y];
     BitRows inner;
     std::fill_n(inner.begin(), w.height, std::uint64_t{0});
     draw_interior(w, inner);
@@ -424,11 +424,12 @@ bool is_piece(const BlobLimits& limits, const Blob& blob) {
 
 // The marker of which this blob shows a part, with a bite out of it or with something else at it, when there
 // is one; else the blob as it was.
-void complete_outline(const PlaneFit& fit, const BlobLimits& limits, bool of_pieces, BlobWorkspace& w,
-                      Blob& blob) {
+void complete_outline(const ImageView& image, const PlaneFit& fit, const BlobLimits& limits, bool of_pieces,
+                      BlobWorkspace& w, Blob& blob) {
     Ellipse ellipse;
     if (!follow_ellipse(w, kHalf, ellipse) || !keep_ellipse(ellipse, w)) return;
     w.box = box_of(w.blob, 0, w.height);
+    if (touches_border(image, w)) return;
     draw_moat(w.blob, w.width, w.height, w.moat);
     const SoftMoments seen = soft_moments(w, kHalf);
     const SoftMoments moments = fill_moments(
@@ -448,8 +449,8 @@ void complete_outline(const PlaneFit& fit, const BlobLimits& limits, bool of_pie
 }
 
 // The same from all the paint around it that could be of the same marker.
-void join_pieces(Side side, const PlaneFit& fit, const BlobLimits& limits, double x, double y,
-                 BlobWorkspace& w, Blob& blob) {
+void join_pieces(const ImageView& image, Side side, const PlaneFit& fit, const BlobLimits& limits, double x,
+                 double y, BlobWorkspace& w, Blob& blob) {
     const BitRows own = w.blob;
     const BitBox own_box = w.box;
     const BitRows hidden = w.hidden;
@@ -461,7 +462,7 @@ void join_pieces(Side side, const PlaneFit& fit, const BlobLimits& limits, doubl
     w.blob = own;
     w.box = own_box;
     w.hidden.fill(0);
-    if (gather_pieces(x, y, radius, kHalf, w)) complete_outline(fit, limits, true, w, blob);
+    if (gather_pieces(x, y, radius, kHalf, w)) complete_outline(image, fit, limits, true, w, blob);
     if (blob.completed) return;
     w.blob = own;
     w.box = own_box;
@@ -492,14 +493,17 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
     if (may_be_completed(side, limits, blob)) {
         if (several) {
             std::fill_n(w.blob.begin(), w.height, std::uint64_t{0});
-            join_pieces(side, fit, limits, 0.5 * (component.left + component.right) - w.left,
+            join_pieces(image, side, fit, limits, 0.5 * (component.left + component.right) - w.left,
                         0.5 * (component.top + component.bottom) - w.top, w, blob);
         } else if (is_piece(limits, blob)) {
-            join_pieces(side, fit, limits, blob.x_px - w.left, blob.y_px - w.top, w, blob);
+            join_pieces(image, side, fit, limits, blob.x_px - w.left, blob.y_px - w.top, w, blob);
         }
         if (!several && !blob.completed && has_odd_outline(blob)) {
             compute_cover(w, side, fit.plane, blob.contrast, kRedrawReach + kMoatReach);
-            complete_outline(fit, limits, false, w, blob);
+            const BitRows own = w.blob;
+            const BitBox own_box = w.box;
+            complete_outline(image, fit, limits, false, w, blob);
+            if (!blob.completed) w.blob = own, w.box = own_box;
         }
     }
     Rejection reason = Rejection::kNone;

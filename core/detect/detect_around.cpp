@@ -213,6 +213,7 @@ bool Detector::search_windows(const ImageView& image, Side side, std::span<const
                               SideResult& result) {
     result.blobs.clear();
     result.report = DetectorReport{};
+    result.second_looks = 0;
     workspace_.examined.clear();
     for (const ExpectedMarker& marker : expected) {
         if (is_usable(marker) && !search_window(image, side, marker, result)) return false;

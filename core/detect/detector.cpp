@@ -1,8 +1,11 @@
 #include "core/detect/detector.hpp"
 
 #include <algorithm>
+#include <span>
+#include <tuple>
 
 #include "core/base/math.hpp"
+#include "core/detect/blob_shape.hpp"
 #include "core/detect/components.hpp"
 #include "core/detect/edge_slope.hpp"
 #include "core/image/kernels.hpp"
@@ -17,11 +20,13 @@ constexpr int kLumaRows = 8;    // every so manieth row is enough for the mean
 constexpr int kCorePixels = 3;  // beyond one and a half thresholds
 constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
                                                            0.75};  // of a component's own range of grey
-constexpr double kFringe = 4.0;           // px by which blur and noise lengthen a component
-constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual marker
-constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
-constexpr std::uint32_t kSparse = 2;      // boxes are that much larger than what is in them
-constexpr double kDimmest = 0.4;          // of the least contrast, in a dim image
+constexpr double kFringe = 4.0;          // px by which blur and noise lengthen a component
+constexpr double kSizeMargin = 1.6;      // largest marker of an image / usual marker
+constexpr double kSettledQuality = 4.0;  // summed scores below which a settled polarity is doubted
+constexpr std::uint32_t kSparse = 2;     // boxes are that much larger than what is in them
+constexpr std::size_t kMostSecondLooks =
+    128;                          // of an image or its windows: texture like a beard has hundreds of pieces
+constexpr double kDimmest = 0.4;  // of the least contrast, in a dim image
 constexpr double kTriedSizes = 1.5;       // long components are no one marker
 constexpr double kHopelessBadness = 1.5;  // score 0
 
@@ -256,6 +261,7 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     Workspace& w = workspace_;
     result.blobs.clear();
     result.report = DetectorReport{};
+    result.second_looks = 0;
     w.failed.clear();
     const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
     const double largest = largest_marker(state_.usual_size_px);
@@ -345,7 +351,7 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         return false;
     }
     BlobLimits limits = config_.blob;
-    limits.usual_size_px = search.usual_size_px;
+    limits.usual_size_px = result.second_looks < kMostSecondLooks ? search.usual_size_px : 0.0;
     limits.usual_depth = search.usual_depth;
     limits.min_contrast = least_contrast(search.side);
     Blob blob;
@@ -356,6 +362,7 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         alone && measure_quickly(search.image, search.side, start, limits, workspace_.quick, blob);
     if (!quick || blob.long_axis_px < kPieceSize * limits.usual_size_px) {
         blob = measure_blob(search.image, search.side, component, runs, siblings, limits, workspace_.blob);
+        if (may_be_completed(search.side, limits, blob)) ++result.second_looks;
     }
     ++result.report.candidates;
     if (blob.rejection != Rejection::kNone) {
@@ -402,18 +409,28 @@ double Detector::largest_marker(double usual_size_px) const {
                                : config_.blob.max_diameter_px;
 }
 
-// A completed marker and its pieces, or the same one completed from two pieces: the best one stays.
+// A completed marker and its pieces, or the same one completed from two pieces: the best one stays. By
+// rising badness, so that who was dropped drops nobody and the order of the blobs does not matter.
 void Detector::drop_pieces(SideResult& result) {
-    for (std::size_t i = 0; i < result.blobs.size(); ++i) {
-        Blob& whole = result.blobs[i];
-        if (!whole.completed) continue;
-        for (std::size_t k = 0; k < result.blobs.size(); ++k) {
-            Blob& other = result.blobs[k];
-            if (k == i ||
-                !(is_inside(whole, other.x_px, other.y_px) || is_inside(other, whole.x_px, whole.y_px)))
-                continue;
-            const bool worse = other.badness > whole.badness || (other.badness == whole.badness && k > i);
-            (worse ? other : whole).badness += 2.0 * kHopelessBadness;
+    const auto blobs = std::span(result.blobs.begin(), result.blobs.size());
+    std::array<std::uint16_t, kMaxCandidates> order;
+    for (std::size_t i = 0; i < blobs.size(); ++i) order[i] = static_cast<std::uint16_t>(i);
+    std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(blobs.size()),
+              [&](std::uint16_t a, std::uint16_t b) {
+                  const auto key = [](const Blob& blob) {
+                      return std::tuple(blob.badness, blob.y_px, blob.x_px, !blob.completed);
+                  };
+                  return key(blobs[a]) < key(blobs[b]);
+              });
+    for (std::size_t i = 0; i < blobs.size(); ++i) {
+        const Blob& best = blobs[order[i]];
+        if (best.badness >= 2.0 * kHopelessBadness) break;
+        for (std::size_t k = i + 1; k < blobs.size(); ++k) {
+            Blob& other = blobs[order[k]];
+            if (!best.completed && !other.completed) continue;
+            const bool overlap =
+                is_inside(best, other.x_px, other.y_px) || is_inside(other, best.x_px, best.y_px);
+            if (overlap) other.badness += 2.0 * kHopelessBadness;
         }
     }
 }

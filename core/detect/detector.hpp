@@ -153,6 +153,7 @@ class Detector {
         double quality = 0.0;
         double usual_size_px = 0.0;  // long axis; 0 when the markers are too few
         double usual_depth = 0.0;
+        std::size_t second_looks = 0;  // blobs whose pieces or outline may have been completed
     };
 
     struct SplitStorage {

@@ -126,13 +126,15 @@ void Control::handle_goodbye(const FrameView& frame) {
 void Control::release_session() {
     owned_ = false;
     owner_ = 0;
-    port_.stop_streams(kAllStreams);
+    port_.stop_streams(kAllStreams | kStreamHead);
     if (identity_.first_streams.mask != 0) port_.start_streams(identity_.first_streams);
 }
 
 void Control::handle_start(const FrameView& frame) {
     const auto start = decode_start_streams(frame.payload);
     if (!start) return refuse(frame, nak_reason(start.error()));
+    const bool has_head = (identity_.hello.capabilities & kCanStreamHead) != 0;
+    if ((start->mask & kStreamHead) != 0 && !has_head) return refuse(frame, NakReason::kBadValue);
     if (!owned_) owner_ = 0;
     owned_ = true;
     port_.start_streams(*start);

@@ -63,9 +63,8 @@ TEST_F(InspectVerb, RenderedPicturesFromEndToEnd) {
     EXPECT_NE(outcome.out.find("24 frames at 60 Hz, 0.4 s"), std::string::npos) << outcome.out;
     EXPECT_NE(outcome.out.find("longest loss 0 ms"), std::string::npos) << outcome.out;
     const std::string html = page();
-    for (const char* part :
-         {"Take pictures", "first face", "most markers hidden", "data:image/jpeg;base64,",
-          "camera a:", "diameter of a blob, px", "contrast of a blob", "residual of a marker, mm"})
+    for (const char* part : {"Take pictures", "most markers hidden", "data:image/jpeg;base64,", "camera a:",
+                             "diameter of a blob, px", "contrast of a blob", "residual of a marker, mm"})
         EXPECT_NE(html.find(part), std::string::npos) << part;
     EXPECT_EQ(html.find("<script"), std::string::npos);
     EXPECT_LT(html.size(), std::size_t{2} << 20);
