@@ -409,29 +409,25 @@ double Detector::largest_marker(double usual_size_px) const {
                                : config_.blob.max_diameter_px;
 }
 
-// A completed marker and its pieces, or the same one completed from two pieces: the best one stays. By
-// rising badness, so that who was dropped drops nobody and the order of the blobs does not matter.
+// A completed marker and its pieces, or the same one completed from two pieces: the best one stays. What lies
+// in a completed one that is dropped itself goes too; the order of the blobs does not matter.
 void Detector::drop_pieces(SideResult& result) {
     const auto blobs = std::span(result.blobs.begin(), result.blobs.size());
-    std::array<std::uint16_t, kMaxCandidates> order;
-    for (std::size_t i = 0; i < blobs.size(); ++i) order[i] = static_cast<std::uint16_t>(i);
-    std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(blobs.size()),
-              [&](std::uint16_t a, std::uint16_t b) {
-                  const auto key = [](const Blob& blob) {
-                      return std::tuple(blob.badness, blob.y_px, blob.x_px, !blob.completed);
-                  };
-                  return key(blobs[a]) < key(blobs[b]);
-              });
+    std::array<bool, kMaxCandidates> dropped{};
+    const auto key = [](const Blob& blob) { return std::tuple(blob.badness, blob.y_px, blob.x_px); };
     for (std::size_t i = 0; i < blobs.size(); ++i) {
-        const Blob& best = blobs[order[i]];
-        if (best.badness >= 2.0 * kHopelessBadness) break;
-        for (std::size_t k = i + 1; k < blobs.size(); ++k) {
-            Blob& other = blobs[order[k]];
-            if (!best.completed && !other.completed) continue;
-            const bool overlap =
-                is_inside(best, other.x_px, other.y_px) || is_inside(other, best.x_px, best.y_px);
-            if (overlap) other.badness += 2.0 * kHopelessBadness;
+        const Blob& whole = blobs[i];
+        if (!whole.completed) continue;
+        for (std::size_t k = 0; k < blobs.size(); ++k) {
+            const Blob& other = blobs[k];
+            if (k == i ||
+                !(is_inside(whole, other.x_px, other.y_px) || is_inside(other, whole.x_px, whole.y_px)))
+                continue;
+            dropped[key(other) < key(whole) ? i : k] = true;
         }
+    }
+    for (std::size_t i = 0; i < blobs.size(); ++i) {
+        if (dropped[i]) blobs[i].badness += 2.0 * kHopelessBadness;
     }
 }
 
