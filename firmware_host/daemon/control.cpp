@@ -150,7 +150,7 @@ void Control::handle_stop(const FrameView& frame) {
 
 void Control::handle_status(const FrameView& frame) {
     if (!decode_empty(frame.payload)) return refuse(frame, NakReason::kBadLength);
-    port_.request_status();
+    port_.answer_status();
 }
 
 void Control::handle_command(const FrameView& frame) {

@@ -238,10 +238,24 @@ void LinkPort::tell_faults() {
         event.level = event.kind == EventKind::kFaultRaised ? EventLevel::kWarning : EventLevel::kInfo;
         event.fault = number;
         event.count = told_.counts()[number - 1U];
+        if (bit == fault_bit(Fault::kMarkerDrift) && event.kind == EventKind::kFaultRaised)
+            event.text = waiting_.marker_trouble;
         // Streams only go to a host that asked for them; so do events, and they leave room for replies.
         if (streams_.mask == 0 || replies_.size() >= kReplies / 2 || !events_.take(wall_.now_us())) continue;
         static_cast<void>(reply(MessageType::kEvent, event));
     }
+}
+
+// A status has no room for names.
+void LinkPort::answer_status() {
+    request_status();
+    if (waiting_.marker_trouble.view().empty()) return;
+    EventMessage event;
+    event.time_us = clock_.now_us();
+    event.kind = EventKind::kLog;
+    event.level = EventLevel::kWarning;
+    event.text = waiting_.marker_trouble;
+    static_cast<void>(reply(MessageType::kEvent, event));
 }
 
 // An answer to a command: told whether or not anybody streams.

@@ -43,6 +43,8 @@ class LinkPort {
     void note_replaced() { replaced_.fetch_add(1, std::memory_order_relaxed); }
     // A status frame soon, stream or not.
     void request_status() { status_wanted_ = true; }
+    // The same for a host that asked, and before it which markers are in trouble, when some are.
+    void answer_status();
     // False when the queue is full: the host asks again.
     bool reply(MessageType type, ByteSpan payload);
     template <class Message>

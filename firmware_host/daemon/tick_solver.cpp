@@ -1,5 +1,6 @@
 #include "firmware_host/daemon/tick_solver.hpp"
 
+#include "firmware_host/daemon/marker_trouble_text.hpp"
 #include "firmware_host/daemon/neutral_text.hpp"
 
 namespace rig {
@@ -26,6 +27,7 @@ void TickSolver::tick(const FrameSet& frames, FaultMap faults, TickOutput& outpu
     output.neutrals_ended = neutrals_ended_;
     output.neutral_taken = neutral_taken_;
     output.neutral_text = neutral_text_;
+    output.marker_trouble = trouble_text();
 }
 
 TickSolver::Wishes TickSolver::carry_out_wishes() {
@@ -52,6 +54,12 @@ void TickSolver::note_neutral() {
     const bool known = parts_.pack != nullptr && neutral.marker < parts_.pack->marker_count;
     const std::string_view name = known ? parts_.pack->marker_names[neutral.marker] : std::string_view{};
     neutral_text_ = neutral_text(neutral, name.empty() ? "a marker" : name);
+}
+
+FixedText<120> TickSolver::trouble_text() const {
+    if ((state_.faults & fault_bit(Fault::kMarkerDrift)) == 0 || parts_.pack == nullptr) return {};
+    return marker_trouble_text(report_,
+                               std::span(parts_.pack->marker_names).first(parts_.pack->marker_count));
 }
 
 void TickSolver::request_controls(const ControlSet& controls) {

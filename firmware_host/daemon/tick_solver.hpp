@@ -28,6 +28,7 @@ struct TickOutput {
     std::uint32_t neutrals_ended = 0;
     bool neutral_taken = false;
     FixedText<120> neutral_text;
+    FixedText<120> marker_trouble;  // which markers came off or slid; empty when none
 };
 
 struct TickSolverParts {
@@ -64,6 +65,7 @@ class TickSolver {
     [[nodiscard]] Wishes carry_out_wishes();
     void record(const FrameSet& frames, const Wishes& wishes);
     void note_neutral();
+    [[nodiscard]] FixedText<120> trouble_text() const;
     void count(const FrameSet& frames, const FrameReport& report, std::int64_t solve_us);
 
     TickSolverParts parts_;

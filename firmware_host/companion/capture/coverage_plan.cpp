@@ -117,12 +117,11 @@ CoveragePlan::CoveragePlan(BoardSpec board, std::size_t cameras, const CoverageG
 bool CoveragePlan::is_unlike_earlier(std::size_t c, const BoardSighting& sighting, PictureSize size) const {
     const double far_px = kUnlikeShare * std::hypot(size.width_px, size.height_px);
     const auto lean = board_lean(board_, sighting, size);
-    return std::ranges::all_of(earlier_[c], [&](const BoardSighting& before) {
-        const auto moved_px = sighting_distance_px(before, sighting, kCommonPoints);
+    return std::ranges::all_of(earlier_[c], [&](const TakenView& before) {
+        const auto moved_px = sighting_distance_px(before.sighting, sighting, kCommonPoints);
         if (!moved_px || *moved_px > far_px) return true;
-        const auto lean_before = board_lean(board_, before, size);
-        return lean && lean_before &&
-               std::hypot(lean->x - lean_before->x, lean->y - lean_before->y) > kUnlikeLean;
+        return lean && before.lean &&
+               std::hypot(lean->x - before.lean->x, lean->y - before.lean->y) > kUnlikeLean;
     });
 }
 
@@ -161,9 +160,9 @@ void CoveragePlan::take(std::span<const BoardSighting> sightings, std::span<cons
         ++camera.pictures;
         const auto fields = fields_of(sightings[c], sizes[c]);
         for (std::size_t i = 0; i < fields.size(); ++i) camera.seen[i] = camera.seen[i] || fields[i];
-        if (const auto lean = board_lean(board_, sightings[c], sizes[c]))
-            ++camera.tilts[static_cast<std::size_t>(tilt_of(*lean))];
-        earlier_[c].push_back(sightings[c]);
+        const auto lean = board_lean(board_, sightings[c], sizes[c]);
+        if (lean) ++camera.tilts[static_cast<std::size_t>(tilt_of(*lean))];
+        earlier_[c].push_back({sightings[c], lean});
         for (std::size_t d = 0; d < cameras_.size(); ++d)
             if (d != c && is_seen(sightings[d])) ++shared_[c][d];
     }

@@ -76,6 +76,10 @@ class CoveragePlan {
     [[nodiscard]] std::size_t shots() const { return shots_; }
 
   private:
+    struct TakenView {
+        BoardSighting sighting;
+        std::optional<BoardLean> lean;
+    };
     [[nodiscard]] bool adds_to(std::size_t c, std::span<const BoardSighting> sightings,
                                PictureSize size) const;
     [[nodiscard]] bool is_unlike_earlier(std::size_t c, const BoardSighting& sighting,
@@ -87,8 +91,8 @@ class CoveragePlan {
     CoverageGoal goal_;
     std::size_t shots_ = 0;
     std::vector<CoverageProgress> cameras_;
-    std::vector<std::vector<BoardSighting>> earlier_;  // [camera]
-    std::vector<std::vector<std::size_t>> shared_;     // [camera][camera]: moments
+    std::vector<std::vector<TakenView>> earlier_;   // [camera]
+    std::vector<std::vector<std::size_t>> shared_;  // [camera][camera]: moments
 };
 
 }  // namespace rig::host

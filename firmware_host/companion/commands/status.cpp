@@ -3,10 +3,13 @@
 
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "firmware_host/companion/commands/console.hpp"
 #include "firmware_host/companion/commands/link_session.hpp"
 #include "firmware_host/companion/commands/verbs.hpp"
+#include "firmware_host/companion/files/file_error.hpp"
 #include "firmware_host/companion/links/fault_text.hpp"
 #include "firmware_host/companion/links/session_text.hpp"
 
@@ -28,12 +31,20 @@ int list_faults() {
     return kExitOk;
 }
 
+// Boards tell it before the status that was asked for.
+void note_marker_trouble(const EventMessage& event, std::vector<std::string>& told) {
+    if (event.kind == EventKind::kLog && event.text.view().starts_with("marker "))
+        told.push_back(printable(event.text.view()));
+}
+
 int run_status(const StatusOptions& options) {
     std::optional<Health> health;
     SessionOptions wanted;
     wanted.streams = 0;
     wanted.names = false;
     SessionEvents events;
+    std::vector<std::string> told;
+    events.event = [&](const EventMessage& event) { note_marker_trouble(event, told); };
     events.status = [&](const Health& received) { health = received; };
     const auto link = LinkSession::open(options.link, wanted, std::move(events));
     if (!link) return kExitDevice;
@@ -44,6 +55,7 @@ int run_status(const StatusOptions& options) {
     const auto faults = fault_lines(*health);
     if (faults.empty()) fmt::print("faults: none\n");
     for (const std::string& line : faults) fmt::print("{}\n", line);
+    for (const std::string& line : told) fmt::print("{}\n", line);
     const bool well = health->faults == 0 && health->state >= TrackingState::kPartial;
     return options.check && !well ? kExitFailed : kExitOk;
 }

@@ -160,6 +160,17 @@ void print_warnings(const TrainedPack& pack) {
         pack.report.invisible.size(), kInvisibleMm, list));
 }
 
+// A pack of --out that is about to be replaced by one that no longer watches the cameras.
+void warn_of_lost_marks(const TrainCommand& command) {
+    if (command.options.cameras.empty() || !command.options.reference_marks.empty()) return;
+    const auto before = open_pack_file(command.out);
+    if (!before || before->pack().helmet_marks().empty()) return;
+    print_error(fmt::format(
+        "warning: {} held {} reference marks of the helmet and {} has none: the new pack will not notice a "
+        "camera that is knocked; `headrig calibrate cameras --reference` carries marks over",
+        command.out, before->pack().helmet_marks().size(), command.cameras));
+}
+
 // Loads what the options name; the message of the first file that is wrong, or nothing.
 Result<void, FileError> load_inputs(TrainCommand& command, Rig& rig, MarkerLayout& layout) {
     auto loaded_rig = load_rig(command.rig);
@@ -283,6 +294,7 @@ int run_train(TrainCommand& command) {
         print_error(pack.error().message);
         return kExitInput;
     }
+    warn_of_lost_marks(command);
     command.identity.name =
         command.name.empty() ? std::filesystem::path(command.out).stem().string() : command.name;
     if (const auto saved = save_pack(command.out, pack->view(), command.identity); !saved) {
