@@ -18,7 +18,7 @@ Links:
   udp:PORT            datagrams on that port of this machine, with whoever spoke last
 
 Examples:
-  headrig world --rig rig --take take.csv --socket /tmp/world.sock &
+  headrig world --rig rig --take take.csv --serve /tmp/world.sock &
   headrigd --world /tmp/world.sock --pack face.pack --link pty:/tmp/headrig
   headrigd --world /tmp/world.sock --pack face.pack --link udp:192.168.1.20:9700 --stream weights,status
   headrigd --world /tmp/world.sock --pack face.pack --digest --log-observations take.rgo

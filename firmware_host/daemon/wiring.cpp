@@ -192,14 +192,14 @@ Result<void, WiringError> Wiring::Rig::join_world(const CommandLine& command_lin
     if (command_line.world.empty()) {
         return refuse(
             kExitUsage,
-            fmt::format("board '{}' needs --world SOCKET: start 'headrig world --socket SOCKET' first",
+            fmt::format("board '{}' needs --world SOCKET: start 'headrig world --serve SOCKET' first",
                         board.name));
     }
     sim::WorldPatience patience;
     patience.connect_us = static_cast<std::int64_t>(command_line.world_timeout_s * 1e6);
     auto joined = sim::WorldClient::connect(command_line.world, patience);
     if (!joined && joined.error() == sim::WorldError::kNoWorld) {
-        return refuse(kExitWorld, fmt::format("{}: no world answers; start 'headrig world --socket {}'",
+        return refuse(kExitWorld, fmt::format("{}: no world answers; start 'headrig world --serve {}'",
                                               command_line.world, command_line.world));
     }
     if (!joined) {
