@@ -8,6 +8,7 @@ set(OpenCV_LIBS opencv_core opencv_imgproc opencv_imgcodecs)
 set(RIG_OPENCV_CALIBRATION_LIBS opencv_calib3d opencv_aruco)
 set(RIG_OPENCV_CAPTURE_LIBS opencv_videoio)
 find_package(CLI11 REQUIRED)
+find_package(JPEG REQUIRED)  # its headers come with libopencv-dev too, but the board needs it without OpenCV
 find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 pkg_check_modules(SODIUM REQUIRED IMPORTED_TARGET libsodium)

@@ -15,6 +15,9 @@ enum class FrameError : std::uint8_t {
     kIo,          // a transfer failed; the camera is still there
     kShort,       // a frame of the wrong length was discarded
     kFormat,      // a frame of the wrong size or format was discarded
+    kDamaged,     // the driver marked a frame as damaged; it was discarded
+    kCorrupt,     // a compressed frame could not be decoded whole; it was discarded
+    kIdentity,    // another camera than the one that belongs here
     kNotStarted,  // start() has not succeeded
     kRefused,     // a mode or control that this source cannot set
     kEnded,       // the source is finite and is at its end (replay, simulated takes)

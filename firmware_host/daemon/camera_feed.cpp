@@ -50,6 +50,7 @@ Result<FrameFormat, FrameError> CameraFeed::open() {
         back_off_us_ = 0;
         set_status(CameraStatus::kMissing);
     } else {
+        if (format.error() == FrameError::kIdentity) raise(Fault::kCameraIdentity);
         lose();
     }
     return format;
@@ -98,6 +99,12 @@ bool CameraFeed::go_on_after(FrameError error) {
             return true;
         case FrameError::kFormat:
             raise(Fault::kFormatChanged);
+            return true;
+        case FrameError::kDamaged:
+            raise(Fault::kBufferError);
+            return true;
+        case FrameError::kCorrupt:
+            raise(Fault::kCorruptJpeg);
             return true;
         case FrameError::kEnded:
             ended_.store(true, std::memory_order_relaxed);

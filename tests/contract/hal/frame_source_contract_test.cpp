@@ -1,15 +1,18 @@
 // The contract of hal/frame_source.hpp, on every backend.
 #include <gtest/gtest.h>
+#include <linux/videodev2.h>
 
 #include <array>
 #include <memory>
 #include <set>
 
+#include "hal/linux/v4l2/v4l2_frame_source.hpp"
 #include "hal/sim/fault_plan.hpp"
 #include "hal/sim/faulty_frame_source.hpp"
 #include "hal/sim/manual_clock.hpp"
 #include "hal/sim/memory_frame_source.hpp"
 #include "hal/sim/world_client.hpp"
+#include "tests/contract/hal/fake_camera.hpp"
 #include "tests/contract/hal/fake_world.hpp"
 
 namespace rig::test {
@@ -27,6 +30,8 @@ class FrameBench {
     [[nodiscard]] virtual Clock& clock() = 0;
     virtual void frame_done() {}  // what the tick loop does between frames
     [[nodiscard]] virtual bool may_restart() const { return true; }
+    // What follows the last frame: a camera has no end.
+    [[nodiscard]] virtual FrameError after_the_last() const { return FrameError::kEnded; }
 };
 
 sim::FramePacing pacing() {
@@ -92,6 +97,43 @@ class WorldBench final : public FrameBench {
     std::unique_ptr<sim::WorldClient> client_;
 };
 
+// A camera behind a driver that this program pretends to be.
+class V4l2Bench final : public FrameBench {
+  public:
+    explicit V4l2Bench(PixelLayout layout) {
+        FakeSensor sensor;
+        sensor.layouts = {layout};
+        sensor.row_bytes = 20;
+        sensor.frame_total = kFrames;
+        sensor.controls = {{V4L2_CID_EXPOSURE_ABSOLUTE, {1, 500}}, {V4L2_CID_GAIN, {0, 100}}};
+        const int pixel_bytes = bytes_per_pixel(layout);
+        sensor.picture = [=](std::uint32_t n) {
+            std::vector<std::uint8_t> bytes(20 * 6, 0xEE);
+            for (std::size_t y = 0; y < 6; ++y) {
+                for (std::size_t x = 0; x < 8; ++x)
+                    bytes[20 * y + x * static_cast<std::size_t>(pixel_bytes)] = static_cast<std::uint8_t>(n);
+            }
+            return bytes;
+        };
+        machine_.plug_in(2, "1-2.1", "A17", sensor);
+        V4l2CameraConfig config;
+        config.width_px = 8;
+        config.height_px = 6;
+        config.rate_hz = 100.0;
+        config.gain.unit_db = 0.5;
+        config.tree = machine_.tree();
+        source_ = std::make_unique<V4l2FrameSource>(clock_, config);
+    }
+    FrameSource& source() override { return *source_; }
+    Clock& clock() override { return clock_; }
+    [[nodiscard]] FrameError after_the_last() const override { return FrameError::kTimeout; }
+
+  private:
+    sim::ManualClock clock_{3'000'000};
+    FakeVideoMachine machine_{clock_};
+    std::unique_ptr<V4l2FrameSource> source_;
+};
+
 struct FrameBackend {
     const char* name;
     std::unique_ptr<FrameBench> (*make)();
@@ -127,7 +169,7 @@ TEST_P(FrameSourceContract, FramesComeInOrderAndThenTheEnd) {
     while (true) {
         const auto frame = next_frame();
         if (!frame) {
-            EXPECT_EQ(frame.error(), FrameError::kEnded);
+            EXPECT_EQ(frame.error(), bench_->after_the_last());
             break;
         }
         EXPECT_GT(frame->capture_us, last.capture_us);
@@ -143,7 +185,7 @@ TEST_P(FrameSourceContract, FramesComeInOrderAndThenTheEnd) {
     const bool real_time = std::string(GetParam().name) == "WorldRealTime";
     EXPECT_GE(frames, real_time ? 3 : static_cast<int>(kFrames));
     EXPECT_LE(frames, static_cast<int>(kFrames));
-    EXPECT_EQ(next_frame().error(), FrameError::kEnded);
+    EXPECT_EQ(next_frame().error(), bench_->after_the_last());
 }
 
 TEST_P(FrameSourceContract, PixelsStayUntilReleased) {
@@ -219,6 +261,12 @@ INSTANTIATE_TEST_SUITE_P(
                      []() -> std::unique_ptr<FrameBench> { return std::make_unique<SyntheticBench>(); }},
         FrameBackend{"FaultlessFaulty",
                      []() -> std::unique_ptr<FrameBench> { return std::make_unique<FaultlessBench>(); }},
+        FrameBackend{
+            "V4l2Grey",
+            []() -> std::unique_ptr<FrameBench> { return std::make_unique<V4l2Bench>(PixelLayout::kGrey); }},
+        FrameBackend{
+            "V4l2Yuyv",
+            []() -> std::unique_ptr<FrameBench> { return std::make_unique<V4l2Bench>(PixelLayout::kYuyv); }},
         FrameBackend{"WorldLockstep",
                      []() -> std::unique_ptr<FrameBench> {
                          return std::make_unique<WorldBench>(sim::WorldPace::kLockstep);
