@@ -2,10 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <set>
-#include <sstream>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <string_view>
 
 #include "core/limits.hpp"
+#include "firmware_host/daemon/board_fields.hpp"
 #include "firmware_host/settings/filter_table.hpp"
 
 namespace rig {
@@ -18,65 +22,98 @@ std::unexpected<BoardFileError> refuse(const std::filesystem::path& file, const 
     return failure(BoardFileError{fmt::format("{}: {}", file.string(), fault)});
 }
 
-// "" when all keys of the table are known.
-std::string unknown_key(const toml::table& table, const std::set<std::string>& known) {
-    for (const auto& [key, value] : table) {
-        if (!known.contains(std::string(key.str()))) return std::string(key.str());
+void read_controls(BoardFields& fields, BoardVideo& video) {
+    const toml::node* node = fields.take("controls");
+    if (node == nullptr) return;
+    const toml::table* table = node->as_table();
+    if (table == nullptr) return fields.refuse(*node, "'controls' must be a table, { \"0x009a0901\" = 1 }");
+    for (const auto& [key, value] : *table) {
+        const std::string_view digits = key.str();
+        std::uint32_t id = 0;
+        const bool hex = digits.starts_with("0x");
+        const char* end = digits.data() + digits.size();
+        const auto parsed = std::from_chars(digits.data() + (hex ? 2 : 0), end, id, hex ? 16 : 10);
+        const auto number = value.value_exact<std::int64_t>();
+        const bool fits = number && *number >= INT32_MIN && *number <= INT32_MAX;
+        if (parsed.ec != std::errc() || parsed.ptr != end || !fits) {
+            return fields.refuse(value, fmt::format("control '{}' must be the number of a V4L2 control and a "
+                                                    "whole number to set it to",
+                                                    digits));
+        }
+        video.controls.emplace_back(id, static_cast<std::int32_t>(*number));
     }
-    return "";
 }
 
+void read_video(BoardFields& fields, BoardVideo& video) {
+    fields.text("serial", video.serial, 1, 63);
+    fields.whole("width_px", video.width_px, 16, 4096);
+    fields.whole("height_px", video.height_px, 16, 4096);
+    fields.text("pixels", video.pixels, 1, 8);
+    constexpr std::array<std::string_view, 5> kKnown{"auto", "GREY", "Y16", "YUYV", "MJPEG"};
+    if (std::ranges::find(kKnown, video.pixels) == kKnown.end())
+        fields.refuse(*fields.take("pixels"), "'pixels' must be auto, GREY, Y16, YUYV or MJPEG");
+    fields.number("gain_unit_db", video.gain_unit_db, 1e-4, 20.0);
+    fields.number("gain_unity", video.gain_unity, 1e-3, 1e6);
+    fields.whole("readout_us", video.readout_us, 0, 100'000);
+    read_controls(fields, video);
+}
+
+void read_more(BoardFields& fields, BoardCamera& camera) {
+    if (camera.source.starts_with("v4l2:")) read_video(fields, camera.video);
+}
+void read_more(BoardFields&, BoardLine&) {}
+
 template <class Entry>
-std::string read_named(const toml::node_view<const toml::node>& list, const char* what,
-                       std::vector<Entry>& into) {
-    if (!list) return "";
-    const toml::array* entries = list.as_array();
-    if (entries == nullptr) return fmt::format("'{}' must be a list of tables, [[{}]]", what, what);
+void read_named(BoardFields& fields, const char* what, std::vector<Entry>& into) {
+    const toml::node* list = fields.take(what);
+    if (list == nullptr) return;
+    const toml::array* entries = list->as_array();
+    if (entries == nullptr || !entries->is_homogeneous(toml::node_type::table))
+        return fields.refuse(*list, fmt::format("'{}' must be a list of tables, [[{}]]", what, what));
     for (const toml::node& node : *entries) {
-        const toml::table* table = node.as_table();
-        if (table == nullptr) return fmt::format("'{}' must be a list of tables, [[{}]]", what, what);
         Entry entry;
-        entry.name = (*table)["name"].value_or(std::string());
-        entry.source = (*table)["source"].value_or(std::string());
-        if (entry.name.empty() || entry.source.empty())
-            return fmt::format("each [[{}]] needs a name and a source", what);
-        if (const auto key = unknown_key(*table, {"name", "source"}); !key.empty()) {
-            return fmt::format("[[{}]] has no key '{}'", what, key);
-        }
+        const toml::table& table = *node.as_table();
+        const std::string called = table["name"].value_or(std::string());
+        BoardFields own(table, fmt::format("[[{}]]{}: ", what, called.empty() ? "" : " '" + called + "'"));
+        own.text("name", entry.name, 1, 32);
+        own.text("source", entry.source, 1, 128);
+        if (entry.name.empty() || entry.source.empty()) own.refuse(node, "needs a name and a source");
+        read_more(own, entry);
+        own.nothing_else();
         for (const Entry& other : into) {
-            if (other.name == entry.name) return fmt::format("two [[{}]] are called '{}'", what, entry.name);
+            if (other.name == entry.name) own.refuse(node, fmt::format("two [[{}]] have this name", what));
         }
+        fields.pass_on(own.fault());
         into.push_back(std::move(entry));
     }
-    return "";
+}
+
+void read_smoothing(BoardFields& fields, Board& board) {
+    const toml::node* node = fields.take("smoothing");
+    if (node == nullptr) return;
+    const toml::table* table = node->as_table();
+    if (table == nullptr) return fields.refuse(*node, "'smoothing' must be a table");
+    const std::string fault = read_filter_settings(*table, board.smoothing);
+    if (!fault.empty()) fields.refuse(*node, "[smoothing]: " + fault);
 }
 
 std::string read_table(const toml::table& table, Board& board) {
-    const auto key = unknown_key(
-        table, {"name", "rate_hz", "frozen_frames", "default_link", "camera", "line", "smoothing"});
-    if (!key.empty()) return fmt::format("there is no key '{}'", key);
-    board.name = table["name"].value_or(std::string());
-    if (board.name.empty() || board.name.size() > 24) return "'name' must have 1 to 24 bytes";
-    board.rate_hz = table["rate_hz"].value_or(60.0);
-    if (!(board.rate_hz >= 1.0 && board.rate_hz <= 1000.0)) return "'rate_hz' must be 1 to 1000";
-    const auto frozen = table["frozen_frames"].value_or(std::int64_t{3});
-    if (frozen < 0 || frozen == 1 || frozen > 1000) return "'frozen_frames' must be 0 (never) or 2 to 1000";
-    board.frozen_frames = static_cast<int>(frozen);
-    board.default_link = table["default_link"].value_or(std::string());
-    const toml::table& constant = table;
-    std::string fault = read_named(constant["camera"], "camera", board.cameras);
-    if (fault.empty()) fault = read_named(constant["line"], "line", board.lines);
-    if (fault.empty() && board.cameras.size() > kMaxCameras) {
-        fault =
-            fmt::format("there are {} cameras; at most {} are possible", board.cameras.size(), kMaxCameras);
-    }
-    if (fault.empty() && constant["smoothing"]) {
-        const toml::table* smoothing = constant["smoothing"].as_table();
-        fault = smoothing == nullptr ? "'smoothing' must be a table"
-                                     : read_filter_settings(*smoothing, board.smoothing);
-        if (!fault.empty()) fault = "[smoothing]: " + fault;
-    }
-    return fault;
+    BoardFields fields(table, "");
+    fields.text("name", board.name, 1, 24);
+    fields.number("rate_hz", board.rate_hz, 1.0, 1000.0);
+    fields.whole("frozen_frames", board.frozen_frames, 0, 1000);
+    if (board.frozen_frames == 1)
+        fields.refuse(*fields.take("frozen_frames"), "'frozen_frames' must be 0 (never) or 2 to 1000");
+    fields.text("default_link", board.default_link, 0, 256);
+    read_named(fields, "camera", board.cameras);
+    read_named(fields, "line", board.lines);
+    read_smoothing(fields, board);
+    fields.nothing_else();
+    if (fields.fault().empty() && board.name.empty()) return "'name' must have 1 to 24 bytes, in quotes";
+    if (fields.fault().empty() && board.cameras.size() > kMaxCameras)
+        return fmt::format("there are {} cameras; at most {} are possible", board.cameras.size(),
+                           kMaxCameras);
+    return fields.fault();
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <fstream>
+#include <optional>
 #include <random>
 #include <sstream>
 
@@ -17,6 +18,8 @@
 #include "hal/linux/systemd_watchdog.hpp"
 #include "hal/linux/tty_link.hpp"
 #include "hal/linux/udp_link.hpp"
+#include "hal/linux/v4l2/usb_bandwidth.hpp"
+#include "hal/linux/v4l2/v4l2_frame_source.hpp"
 #include "hal/sim/faulty_frame_source.hpp"
 #include "hal/sim/faulty_link.hpp"
 #include "hal/sim/world_client.hpp"
@@ -42,6 +45,46 @@ int world_number(const std::string& source) {
     int number = -1;
     if (!source.starts_with("world:") || !parse_number(std::string_view(source).substr(6), number)) return -1;
     return number;
+}
+
+constexpr std::string_view kKernelCamera = "v4l2:";
+
+std::optional<PixelLayout> layout_called(const std::string& name) {
+    for (std::size_t i = 0; i < kPixelLayouts; ++i) {
+        const auto layout = static_cast<PixelLayout>(i);
+        if (pixel_layout_name(layout) == name) return layout;
+    }
+    return std::nullopt;
+}
+
+V4l2CameraConfig camera_config(const BoardCamera& camera, double rate_hz) {
+    V4l2CameraConfig config;
+    config.camera = {camera.source.substr(kKernelCamera.size()), camera.video.serial};
+    config.width_px = camera.video.width_px;
+    config.height_px = camera.video.height_px;
+    config.rate_hz = rate_hz;
+    config.layout = layout_called(camera.video.pixels);
+    config.gain = {camera.video.gain_unit_db, camera.video.gain_unity};
+    config.readout_us = camera.video.readout_us;
+    for (const auto& [id, value] : camera.video.controls) config.controls.push_back({id, value});
+    return config;
+}
+
+// Of the cameras that are plugged in now. A camera whose layout is left to it counts as GREY, the narrowest
+// of those that are not compressed.
+std::optional<std::string> bandwidth_fault(const Board& board) {
+    std::array<VideoNode, 16> nodes;
+    const std::size_t count = list_video_nodes({}, nodes);
+    std::vector<CameraLoad> loads;
+    for (const BoardCamera& camera : board.cameras) {
+        const V4l2CameraConfig config = camera_config(camera, board.rate_hz);
+        std::size_t found = 0;
+        if (find_camera(std::span(nodes).first(count), config.camera, found) != CameraMatch::kFound) continue;
+        loads.push_back({camera.name, nodes[found].usb_bus, nodes[found].usb_mbps,
+                         config.layout.value_or(PixelLayout::kGrey), config.width_px, config.height_px,
+                         config.rate_hz});
+    }
+    return bandwidth_fault(loads);
 }
 
 Result<std::unique_ptr<ByteLink>, WiringError> make_serial(const std::string& place) {
@@ -134,6 +177,7 @@ struct Wiring::Rig {
     std::unique_ptr<sim::WorldClient> world;
     std::unique_ptr<Pace> pace;
     sim::FaultPlan faults;
+    std::vector<std::unique_ptr<V4l2FrameSource>> kernel_cameras;  // as the board's, or none
     std::vector<std::unique_ptr<FrameSource>> faulty_cameras;
     std::unique_ptr<ByteLink> link;
     std::unique_ptr<ByteLink> faulty_link;
@@ -147,8 +191,13 @@ struct Wiring::Rig {
 
     [[nodiscard]] Result<void, WiringError> take_pack(const CommandLine& command_line);
     [[nodiscard]] Result<void, WiringError> open_host_link(const CommandLine& command_line);
+    [[nodiscard]] Result<void, WiringError> choose_body(const CommandLine& command_line);
+    [[nodiscard]] Result<void, WiringError> take_kernel_cameras(const CommandLine& command_line);
     [[nodiscard]] Result<void, WiringError> join_world(const CommandLine& command_line);
     [[nodiscard]] Result<std::vector<FrameSource*>, WiringError> connect_cameras();
+    [[nodiscard]] Result<FrameSource*, WiringError> camera_behind(std::size_t number);
+    [[nodiscard]] std::uint8_t camera_count() const;
+    void tell_camera_troubles() const;
     [[nodiscard]] GpioLine* connect_line(const std::string& name);
     [[nodiscard]] Result<void, WiringError> configure_pipeline(const CommandLine& command_line);
     [[nodiscard]] Result<void, WiringError> start_log(const CommandLine& command_line);
@@ -188,6 +237,46 @@ Result<void, WiringError> Wiring::Rig::open_host_link(const CommandLine& command
                   fmt::format("--link {}: cannot be opened; is the place there, free and allowed?", spec));
 }
 
+// Cameras of the kernel, or those of a simulated world.
+Result<void, WiringError> Wiring::Rig::choose_body(const CommandLine& command_line) {
+    const auto of_kernel = [](const BoardCamera& camera) { return camera.source.starts_with(kKernelCamera); };
+    const auto count = std::ranges::count_if(board.cameras, of_kernel);
+    if (count == 0) return join_world(command_line);
+    if (count == std::ssize(board.cameras)) return take_kernel_cameras(command_line);
+    return refuse(kExitInput, fmt::format("board '{}': cameras of the kernel (v4l2:) and of a world (world:) "
+                                          "cannot be mixed",
+                                          board.name));
+}
+
+Result<void, WiringError> Wiring::Rig::take_kernel_cameras(const CommandLine& command_line) {
+    if (!command_line.world.empty() || command_line.executor == ExecutorChoice::kLockstep) {
+        return refuse(kExitUsage,
+                      fmt::format("board '{}' has real cameras: --world and --executor lockstep are for "
+                                  "simulated ones",
+                                  board.name));
+    }
+    if (const auto fault = bandwidth_fault(board))
+        return refuse(kExitInput, fmt::format("board '{}': {}", board.name, *fault));
+    lockstep = false;
+    pace = std::make_unique<Pace>();
+    for (const BoardCamera& camera : board.cameras)
+        kernel_cameras.push_back(
+            std::make_unique<V4l2FrameSource>(wall, camera_config(camera, board.rate_hz)));
+    return {};
+}
+
+std::uint8_t Wiring::Rig::camera_count() const {
+    return world ? world->hello().camera_count : static_cast<std::uint8_t>(kernel_cameras.size());
+}
+
+void Wiring::Rig::tell_camera_troubles() const {
+    for (std::size_t c = 0; c < kernel_cameras.size(); ++c) {
+        const std::string_view trouble = kernel_cameras[c]->trouble();
+        if (!trouble.empty())
+            fmt::print(stderr, "headrigd: camera '{}': {}; tried again\n", board.cameras[c].name, trouble);
+    }
+}
+
 Result<void, WiringError> Wiring::Rig::join_world(const CommandLine& command_line) {
     if (command_line.world.empty()) {
         return refuse(
@@ -219,22 +308,33 @@ Result<void, WiringError> Wiring::Rig::join_world(const CommandLine& command_lin
                               lockstep ? "in lockstep" : "in real time", lockstep ? "lockstep" : "threads"));
 }
 
+// nullptr for a camera that the world does not have.
+Result<FrameSource*, WiringError> Wiring::Rig::camera_behind(std::size_t number) {
+    if (!kernel_cameras.empty()) return kernel_cameras[number].get();
+    const BoardCamera& camera = board.cameras[number];
+    const int in_world = world_number(camera.source);
+    if (in_world < 0) {
+        return refuse(kExitInput,
+                      fmt::format("board '{}': camera '{}' has the source '{}'; known are world:NUMBER and "
+                                  "v4l2:PATH",
+                                  board.name, camera.name, camera.source));
+    }
+    if (in_world >= world->hello().camera_count) return nullptr;
+    return &world->camera(static_cast<std::size_t>(in_world));
+}
+
 Result<std::vector<FrameSource*>, WiringError> Wiring::Rig::connect_cameras() {
     std::vector<FrameSource*> cameras;
-    for (const BoardCamera& camera : board.cameras) {
-        const int number = world_number(camera.source);
-        if (number < 0) {
-            return refuse(
-                kExitInput,
-                fmt::format("board '{}': camera '{}' has the source '{}'; only world:NUMBER is known",
-                            board.name, camera.name, camera.source));
-        }
-        if (number >= world->hello().camera_count) continue;
-        FrameSource* source = &world->camera(static_cast<std::size_t>(number));
+    for (std::size_t c = 0; c < board.cameras.size(); ++c) {
+        const auto behind = camera_behind(c);
+        if (!behind) return failure(behind.error());
+        FrameSource* source = *behind;
+        if (source == nullptr) continue;
         if (!faults.events.empty()) {
             const auto target = static_cast<std::uint8_t>(cameras.size());
+            Clock& clock = world ? world->clock() : wall;
             faulty_cameras.push_back(
-                std::make_unique<sim::FaultyFrameSource>(*source, world->clock(), faults, target));
+                std::make_unique<sim::FaultyFrameSource>(*source, clock, faults, target));
             source = faulty_cameras.back().get();
         }
         cameras.push_back(source);
@@ -245,7 +345,7 @@ Result<std::vector<FrameSource*>, WiringError> Wiring::Rig::connect_cameras() {
 GpioLine* Wiring::Rig::connect_line(const std::string& name) {
     const BoardLine* line = board.line(name);
     const int number = line == nullptr ? -1 : world_number(line->source);
-    if (number < 0 || number >= static_cast<int>(sim::kWorldLineCount)) return nullptr;
+    if (!world || number < 0 || number >= static_cast<int>(sim::kWorldLineCount)) return nullptr;
     return &world->line(static_cast<sim::WorldLine>(number));
 }
 
@@ -273,8 +373,8 @@ Result<void, WiringError> Wiring::Rig::configure_pipeline(const CommandLine& com
 Result<void, WiringError> Wiring::Rig::start_log(const CommandLine& command_line) {
     if (command_line.log_observations.empty()) return {};
     ObservationLogHeader header;
-    header.camera_count = world->hello().camera_count;
-    header.rate_millihertz = world->hello().rate_millihertz;
+    header.camera_count = camera_count();
+    header.rate_millihertz = static_cast<std::uint32_t>(board.rate_hz * 1000.0 + 0.5);
     header.filter = running.filter;
     header.stabilise = running.stabilise;
     header.camera_on_head = running.camera_on_head;
@@ -293,7 +393,8 @@ BoardIdentity Wiring::Rig::identity(const CommandLine& command_line) const {
     Hello& hello = result.hello;
     hello.role = Role::kBoard;
     hello.session_id = std::random_device{}();
-    hello.capabilities = kCanStreamMarkers | kCanResetTracking | kCanControl | kIsSimulated;
+    hello.capabilities = kCanStreamMarkers | kCanResetTracking | kCanControl;
+    if (world) hello.capabilities |= kIsSimulated;
     if (!running.camera_on_head) hello.capabilities |= kCanStreamHead;
     hello.rate_mhz = static_cast<std::uint32_t>(board.rate_hz * 1000.0 + 0.5);
     hello.firmware = FixedText<24>(RIG_VERSION);
@@ -367,12 +468,13 @@ Result<std::unique_ptr<Wiring>, WiringError> Wiring::build(const CommandLine& co
     rig.faults = std::move(*faults);
     Result<void, WiringError> step = rig.take_pack(command_line);
     if (step) step = rig.open_host_link(command_line);
-    if (step) step = rig.join_world(command_line);
+    if (step) step = rig.choose_body(command_line);
     if (step) step = rig.configure_pipeline(command_line);
     if (step) step = rig.start_log(command_line);
     if (step) step = rig.assemble_app(command_line);
     if (!step) return failure(step.error());
     rig.app->open_cameras();
+    rig.tell_camera_troubles();
     if (command_line.real_time && !os::become_real_time()) {
         fmt::print(
             stderr,
@@ -391,7 +493,7 @@ App& Wiring::app() {
 }
 
 std::string Wiring::world_fault() const {
-    const char* fault = rig_->world->fault();
+    const char* fault = rig_->world ? rig_->world->fault() : nullptr;
     return fault == nullptr ? "" : fault;
 }
 
