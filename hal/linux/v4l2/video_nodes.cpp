@@ -67,14 +67,19 @@ bool describe(const DeviceTree& tree, int number, VideoNode& node) {
     Path path{};
     Path target{};
     const char* sysfs = tree.sysfs.c_str();
-    if (!join(path, "%s/class/video4linux/video%d/device", sysfs, number) || !link_target(path, target))
-        return false;
+    if (!join(path, "%s/class/video4linux/video%d/name", sysfs, number)) return false;
+    read_line(path, node.name);
+    if (node.name.view().empty()) return false;
     if (!join(path, "%s/video%d", tree.dev.c_str(), number)) return false;
     node.device.set(path.data());
-    static_cast<void>(join(path, "%s/class/video4linux/video%d/name", sysfs, number));
-    read_line(path, node.name);
     static_cast<void>(join(path, "%s/class/video4linux/video%d/index", sysfs, number));
     node.index = read_number(path);
+    const bool has_device =
+        join(path, "%s/class/video4linux/video%d/device", sysfs, number) && link_target(path, target);
+    if (!has_device) {
+        node.path.set(node.name.view());
+        return true;
+    }
     const std::string_view owner = last_part(target.data());
     const std::string_view usb = usb_device_of(owner);
     if (usb.empty()) {

@@ -28,8 +28,9 @@ struct ShortText {
 struct VideoNode {
     ShortText<64> device;  // "/dev/video2"
     ShortText<64> name;    // as the driver calls it: "USB Camera: USB Camera"
-    ShortText<64> path;    // of the port, "usb-1-2.1" for port 1 of the hub in port 2 of bus 1; otherwise the
-                           // device's own name, "vivid.0"
+    // Of the port, "usb-1-2.1" for port 1 of the hub in port 2 of bus 1; otherwise the device's own name,
+    // "vivid.0"; of a node without a device its driver's name for it.
+    ShortText<64> path;
     ShortText<64> serial;  // of the USB device; empty when it tells none
     int index = 0;         // of the nodes of one device: UVC cameras have a second one without pictures
     int usb_bus = 0;       // 0: not on USB

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <vector>
 
 #include "tests/contract/hal/fake_camera.hpp"
@@ -75,6 +77,16 @@ TEST_F(VideoNodes, TheOnlyCameraNeedsNoNameAndOneOfTwoDoes) {
     machine_.plug_in(5, "1-2", "", {});
     EXPECT_EQ(find({}), CameraMatch::kAmbiguous);
     EXPECT_EQ(find({"usb-1-2", ""}), CameraMatch::kFound);
+}
+
+TEST_F(VideoNodes, ANodeWithoutADeviceIsKnownByItsName) {
+    const std::filesystem::path entry =
+        std::filesystem::path(machine_.tree().sysfs) / "class/video4linux/video9";
+    std::filesystem::create_directories(entry);
+    std::ofstream(entry / "name") << "loop\n";
+    std::string device;
+    EXPECT_EQ(find({"loop", ""}, &device), CameraMatch::kFound);
+    EXPECT_TRUE(device.ends_with("video9"));
 }
 
 TEST_F(VideoNodes, LongTextsAreCutNotOverrun) {
