@@ -83,7 +83,11 @@ void App::wait_for_host(const std::atomic<bool>& stop) {
 
 FaultMap App::take_feed_faults() {
     FaultMap faults = 0;
-    for (const auto& feed : feeds_) faults |= feed->take_faults();
+    for (const auto& feed : feeds_) {
+        faults |= feed->take_faults();
+        // Also of a camera that the pack does not know, and without a pack.
+        if (feed->status() == CameraStatus::kGone) faults |= fault_bit(Fault::kCameraGone);
+    }
     return faults;
 }
 
