@@ -278,6 +278,13 @@ void assign_group(std::size_t leader, std::size_t markers, double gate_mm, Match
 
 }  // namespace
 
+bool same_names(std::size_t marker_count, const SightingSet& sightings, const Matches& a, const Matches& b) {
+    for (std::size_t view = 0; view < sightings.view_count; ++view) {
+        if (!std::equal(a[view].begin(), a[view].begin() + marker_count, b[view].begin())) return false;
+    }
+    return true;
+}
+
 void find_left_over(std::size_t marker_count, const SightingSet& sightings, const Matches& matches,
                     LeftOverSightings& left_over) {
     for (std::size_t view = 0; view < sightings.view_count; ++view) {

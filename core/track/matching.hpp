@@ -53,6 +53,9 @@ struct MatchingWorkspace {
     AssignmentWorkspace assignment;
 };
 
+[[nodiscard]] bool same_names(std::size_t marker_count, const SightingSet& sightings, const Matches& a,
+                              const Matches& b);
+
 // Sightings of each view that no marker was given, rising.
 using LeftOverSightings = std::array<BoundedVector<std::uint16_t, kMaxSightings>, kMaxCameras>;
 void find_left_over(std::size_t marker_count, const SightingSet& sightings, const Matches& matches,
