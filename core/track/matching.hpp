@@ -44,6 +44,7 @@ struct MatchingWorkspace {
     // Markers that compete for sightings, directly or through others, form a group, named by its first
     // marker.
     std::array<std::uint16_t, kMaxMarkers> group{};
+    std::array<std::uint16_t, kMaxMarkers> group_size{};     // by its first marker
     std::array<std::int16_t, kMaxSightings> first_marker{};  // that is near a sighting, -1 none
     std::array<std::uint16_t, kMaxMarkers> rows{};           // of one group
     std::array<std::uint16_t, kMaxSightings> columns{};
