@@ -52,6 +52,7 @@ Mat2 distortion_slope(const CameraModel& camera, const Vec2& p, const Radial& ra
 Vec3 undistort_rational(const CameraModel& camera, const Vec2& target) {
     Vec2 p = target;
     for (int i = 0; i < kUndistortSteps; ++i) {
+        const Vec2 before = p;
         const Radial radial = radial_of(camera, p.dot(p));
         const Vec2 error = distort(camera, p, radial) - target;
         const Mat2 slope = distortion_slope(camera, p, radial);
@@ -63,6 +64,7 @@ Vec3 undistort_rational(const CameraModel& camera, const Vec2& target) {
         } else {
             p -= error;
         }
+        if (p == before) break;  // and would stay there
     }
     return {p[0], p[1], 1.0};
 }

@@ -1,5 +1,6 @@
 #include "core/geometry/shape_fit.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/base/check.hpp"
@@ -12,6 +13,7 @@ namespace {
 
 // A step that leaves more than this of the step before came from a matrix that no longer fits.
 constexpr double kStaleShare = 0.25;       // of the squared length
+constexpr double kLeftShare = 0.25;        // of the limit's square, for a step that is foretold
 constexpr double kStaleSigmas = 1e-3;      // shorter steps are rounding
 constexpr double kLeastStepSigmas = 1e-7;  // of a fit without a memory: as far as the steps lead
 
@@ -135,6 +137,7 @@ void take_step(const ShapeModel& model, const ShapeFitWorkspace& w, ShapeFit& fi
 bool iterate(const FitProblem& p, const ShapeFitLimits& limits, ShapeFitMemory& memory, ShapeFitWorkspace& w,
              ShapeFit& fit) {
     double before = 0.0;
+    double shrank = 1.0;  // the step before, of the one before it: squared lengths
     if (!prepare_factor(p, fit, {}, w, memory) && !prepare_anew(p, fit, w, memory)) return false;
     for (int step = 0; step < limits.steps; ++step) {
         fill_right(p, fit, w);
@@ -149,8 +152,12 @@ bool iterate(const FitProblem& p, const ShapeFitLimits& limits, ShapeFitMemory& 
         }
         take_step(p.model, w, fit);
         place_markers(p.model, fit, w);
-        if (squared < limits.step_sigmas * limits.step_sigmas) break;
+        const double limit = limits.step_sigmas * limits.step_sigmas;
+        const double shrinks = step > 0 ? squared / before : 1.0;
+        // Steps shrink alike, so the next one can be told from these.
+        if (squared < limit || (step > 1 && std::max(shrinks, shrank) * squared < kLeftShare * limit)) break;
         before = squared;
+        shrank = shrinks;
     }
     return true;
 }

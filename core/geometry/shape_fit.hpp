@@ -54,7 +54,8 @@ struct ShapeFitWorkspace {
 
 struct ShapeFitLimits {
     int steps = 6;
-    // The last step taken is shorter than this, in standard deviations of what is fitted (Newton decrement).
+    // The last step taken is shorter than this, in standard deviations of what is fitted (Newton decrement),
+    // or the next would be shorter than half of it, as the last three shrink.
     double step_sigmas = 1e-2;
 };
 

@@ -13,6 +13,7 @@ namespace {
 constexpr std::size_t kStride = ShapeInformation::kStride;
 // Floats taken out and put in leave 6e-8 of a marker each time; after this many the matrix is built anew.
 constexpr std::uint16_t kMostChanges = 512;
+constexpr std::size_t kUnknowns = 4;
 
 double largest_entry(const Mat3& a) {
     return a.cwiseAbs().maxCoeff();
@@ -128,11 +129,19 @@ bool factor_shape(const ShapeInformation& information, std::size_t mode_count,
 double solve_shape(const ShapeFactor& factor, std::size_t mode_count, double* x) {
     const std::size_t size = mode_count + 6;
     double squares = 0.0;
-    for (std::size_t i = 0; i < size; ++i) {
-        const double* row = factor.upper.data() + i * ShapeFactor::kStride;
-        x[i] /= row[i];
-        squares += x[i] * x[i];
-        add_scaled(x + i + 1, -x[i], row + i + 1, size - i - 1);
+    // Four unknowns leave the rest in one pass, in the order of single ones.
+    for (std::size_t first = 0; first < size; first += kUnknowns) {
+        const std::size_t end = first + kUnknowns < size ? first + kUnknowns : size;
+        double taken[kUnknowns] = {};
+        for (std::size_t i = first; i < end; ++i) {
+            const double* row = factor.upper.data() + i * ShapeFactor::kStride;
+            x[i] /= row[i];
+            squares += x[i] * x[i];
+            taken[i - first] = -x[i];
+            for (std::size_t j = i + 1; j < end; ++j) x[j] += -x[i] * row[j];
+        }
+        combine_rows(factor.upper.data() + first * ShapeFactor::kStride + end, ShapeFactor::kStride, taken,
+                     end - first, size - end, x + end, x + end);
     }
     for (std::size_t i = size; i-- > 0;) {
         const double* row = factor.upper.data() + i * ShapeFactor::kStride;

@@ -59,7 +59,8 @@ struct ShapePriorInformation {
 [[nodiscard]] bool factor_shape(const ShapeInformation& information, std::size_t mode_count,
                                 const ShapePriorInformation& prior, ShapeFactor& factor);
 
-// x := (matrix + prior)^-1 x, x [mode_count + 6]; returns x^T (matrix + prior)^-1 x of the old x.
+// x := (matrix + prior)^-1 x, x [mode_count + 6] and room for kLaneFloats more; returns x^T (matrix +
+// prior)^-1 x of the old x.
 [[nodiscard]] double solve_shape(const ShapeFactor& factor, std::size_t mode_count, double* x);
 
 }  // namespace rig

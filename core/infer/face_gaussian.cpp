@@ -48,15 +48,22 @@ void build_precision(FaceGaussianWorkspace& w, FaceGaussian& face) {
     w.factor.fill(0.0);
     for (std::size_t i = 0; i < d; ++i) w.factor[i * kMaxModes + i] = 1.0;
     for (std::size_t r = 0; r < rows; ++r) {
-        const double weight = 1.0 / (face.noise_mm2 + face.residual_mm2[r / 3]);
+        const double weight = face.measured_weight(r / 3);
         const double* row = face.mode_row(r);
         for (std::size_t i = 0; i < d; ++i)
             add_scaled(w.factor.data() + i * kMaxModes, weight * row[i], row, i + 1);
     }
+    for (std::size_t i = 0; i < d; ++i) {
+        for (std::size_t j = 0; j <= i; ++j) {
+            const double entry = w.factor[i * kMaxModes + j];
+            face.measured_modes[i * kMaxModes + j] = entry;
+            face.measured_modes[j * kMaxModes + i] = entry;
+        }
+    }
     const bool positive = cholesky(w.factor.data(), w.factor.data(), d, kMaxModes, 0.0);
     RIG_CHECK(positive);  // I plus squares
     for (std::size_t r = 0; r < rows; ++r) {
-        const double weight = 1.0 / (face.noise_mm2 + face.residual_mm2[r / 3]);
+        const double weight = face.measured_weight(r / 3);
         double* v = w.whitened.data() + r * kMaxModes;
         for (std::size_t j = 0; j < d; ++j) v[j] = weight * face.mode_row(r)[j];
         solve_lower(w.factor.data(), d, kMaxModes, v);
@@ -77,6 +84,7 @@ void build_face_gaussian(const SolvePack& pack, const ShapeModel& model, FaceGau
     const auto noise_mm = static_cast<double>(pack.noise_mm);
     face.modes.fill(0.0);  // kernels read rows to their end
     face.precision.fill(0.0);
+    face.measured_modes.fill(0.0);
     face.marker_count = pack.marker_count;
     face.noise_mm2 = noise_mm * noise_mm;
     if (pack.marker_set_count > 0) {

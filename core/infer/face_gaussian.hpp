@@ -27,9 +27,16 @@ struct FaceGaussian {
     std::array<double, kMaxRows * kMaxModes> modes{};  // rows x0, y0, z0, x1, ..., kMaxModes apart
     std::array<double, kMaxMarkers> residual_mm2{};    // of one coordinate: what the modes leave
     std::array<double, kMaxMarkers> prior_mm2{};       // trace of the marker's covariance
+    // Of the modes when every marker is measured: I + sum_k M_k^T M_k measured_weight(k); symmetric, rows
+    // kMaxModes apart, zeros behind the modes.
+    std::array<double, kMaxModes * kMaxModes> measured_modes{};
     // Of the measured coordinates; rows kMaxRows apart, zeros behind 3m.
     std::array<double, kMaxRows * kMaxRows> precision{};
 
+    // Of one coordinate of a measured marker about what the modes say, 1/mm^2.
+    [[nodiscard]] double measured_weight(std::size_t marker) const {
+        return 1.0 / (noise_mm2 + residual_mm2[marker]);
+    }
     [[nodiscard]] const double* mode_row(std::size_t row) const { return modes.data() + row * kMaxModes; }
 };
 

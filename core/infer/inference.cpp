@@ -17,15 +17,16 @@ constexpr double kSmallestDepthShare =
 constexpr double kWeakPrior = 0.01;  // of a marker's mean information
 // A marker counts as measured when it is known at least half as well as the pack expects along every axis.
 constexpr double kMeasuredShare = 0.25;
+constexpr double kRayShare = 1e-9;  // of what is known across a ray: more of it along the ray is a second ray
 constexpr double kFarthestSpreads = 6.0;  // from the mean face; a Gaussian is there once in 1e8 frames
 
-static_assert(InferenceWorkspace::kMaxHiddenRows >= kMaxModes);
 constexpr std::size_t kStride = InferenceWorkspace::kStride;
 using Prepared = InferenceWorkspace::Prepared;
 
-// What a frame tells of one marker. What it weighs depends on this marker alone: were it taken for better
-// known because others are hidden, a confidence could rise when a marker is hidden.
-enum class Knowledge : std::uint8_t { kHidden = 0, kPartly = 1, kMeasured = 2 };
+struct Census {
+    std::size_t hidden = 0;
+    std::size_t partly = 0;
+};
 
 bool is_at_least(const Mat3& information, double floor) {
     const Mat3 rest = information - floor * Mat3::Identity();
@@ -33,22 +34,36 @@ bool is_at_least(const Mat3& information, double floor) {
     return rest(0, 0) >= 0.0 && two >= 0.0 && rest.determinant() >= 0.0;
 }
 
-Knowledge knowledge_of(const StabilisedMarker& marker, double nominal) {
-    if (!marker.seen || !(marker.information.trace() > 0.0)) return Knowledge::kHidden;
-    return is_at_least(marker.information, kMeasuredShare * nominal) ? Knowledge::kMeasured
-                                                                     : Knowledge::kPartly;
+// What it weighs depends on this marker alone: were it taken for better known because others are hidden, a
+// confidence could rise when a marker is hidden.
+MarkerKnowledge knowledge_of(const StabilisedMarker& marker, double nominal) {
+    if (!marker.seen || !(marker.information.trace() > 0.0)) return MarkerKnowledge::kHidden;
+    return is_at_least(marker.information, kMeasuredShare * nominal) ? MarkerKnowledge::kMeasured
+                                                                     : MarkerKnowledge::kPartly;
+}
+
+// Across a single ray and as well known in every direction there: A = a (I - d d^T), a half the trace.
+bool is_across_one_ray(const Mat3& information) {
+    const double across = 0.5 * information.trace();
+    const Mat3 along = across * Mat3::Identity() - information;
+    Eigen::Index at = 0;
+    if (along(1, 1) > along(at, at)) at = 1;
+    if (along(2, 2) > along(at, at)) at = 2;
+    const Vec3 column = along.col(at);
+    const Mat3 rest = along - column * column.transpose() / along(at, at);
+    return rest.cwiseAbs().maxCoeff() <= kRayShare * across;
+}
+
+// No eigenvalue is larger; of a single ray it is the largest.
+double largest_information(const Mat3& information) {
+    if (is_across_one_ray(information)) return 0.5 * information.trace();
+    return (information.cwiseAbs() * Vec3::Ones()).maxCoeff();
 }
 
 // Of a partly measured marker, about modes' prediction: A (I + r A)^-1, A scaled down where it claims more
 // than a measured marker has.
 Mat3 partial_weight(const Mat3& information, double nominal, double residual_mm2) {
-    double largest = 0.0;  // over the sums of rows: no eigenvalue is larger
-    for (int i = 0; i < 3; ++i) {
-        const double sum =
-            std::fabs(information(i, 0)) + std::fabs(information(i, 1)) + std::fabs(information(i, 2));
-        largest = std::max(largest, sum);
-    }
-    const Mat3 capped = information * std::min(1.0, nominal / largest);
+    const Mat3 capped = information * std::min(1.0, nominal / largest_information(information));
     const Mat3 grown = Mat3::Identity() + residual_mm2 * capped;
     const Mat3 weight = capped * inverse_3x3(grown);
     return 0.5 * (weight + weight.transpose());
@@ -58,9 +73,9 @@ Mat3 partial_weight(const Mat3& information, double nominal, double residual_mm2
 bool precision_is_cheaper(const FaceGaussian& face, std::size_t hidden) {
     const std::size_t n = 3 * hidden;
     const std::size_t d = face.mode_count;
-    const std::size_t rows = 3U * face.marker_count;
+    const std::size_t terms = std::min(n, 3U * face.marker_count - n);
     if (n > InferenceWorkspace::kMaxHiddenRows) return false;
-    return n * n * n / 3 <= (rows - n) * d * d / 2 + d * d * d / 3 + n * d * d / 2;
+    return n * n * n / 3 <= terms * d * d / 2 + d * d * d / 6 + n * d * d / 2;
 }
 
 // x := L^-T L^-1 right, through `half`.
@@ -97,78 +112,27 @@ bool prepare_by_precision(const FaceGaussian& face, std::size_t hidden, Inferenc
     return true;
 }
 
-Mat3 weight_of(const FaceGaussian& face, const StabilisedMarker& marker, std::size_t k, Knowledge knowledge) {
-    if (knowledge == Knowledge::kPartly)
-        return partial_weight(marker.information, 1.0 / face.noise_mm2, face.residual_mm2[k]);
-    return Mat3{Mat3::Identity() / (face.noise_mm2 + face.residual_mm2[k])};
-}
-
-// Adds M^T W M to the upper triangle.
-void add_marker(const FaceGaussian& face, std::size_t marker, const Mat3& weight, InferenceWorkspace& w) {
-    const std::size_t d = face.mode_count;
-    const double* m0 = face.mode_row(3 * marker);
-    const double* m1 = m0 + kMaxModes;
-    const double* m2 = m1 + kMaxModes;
-    for (Eigen::Index a = 0; a < 3; ++a) {
-        double* row = w.weighted.data() + static_cast<std::size_t>(a) * kMaxModes;
-        for (std::size_t j = 0; j < d; ++j)
-            row[j] = weight(a, 0) * m0[j] + weight(a, 1) * m1[j] + weight(a, 2) * m2[j];
-    }
-    const double* w0 = w.weighted.data();
-    const double* w1 = w0 + kMaxModes;
-    const double* w2 = w1 + kMaxModes;
-    for (std::size_t i = 0; i < d; ++i) {
-        double* out = w.system.data() + i * kStride;
-        for (std::size_t j = i; j < d; ++j) out[j] += m0[i] * w0[j] + m1[i] * w1[j] + m2[i] * w2[j];
-    }
-}
-
-// Of x = M c + e given what was measured of this marker too, with K = I - r W (W = 0 when nothing was):
-//   covariance r K + K M P M^T K^T.
-double variance_by_modes(const FaceGaussian& face, std::size_t k, const Mat3& weight, InferenceWorkspace& w) {
-    const std::size_t d = face.mode_count;
-    const double r = face.residual_mm2[k];
-    const Mat3 kept = Mat3::Identity() - r * weight;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double* row = face.mode_row(3 * k + axis);
-        double* v = w.weighted.data() + axis * kMaxModes;
-        for (std::size_t i = 0; i < d; ++i) v[i] = dot(w.inverse.data() + i * kStride, row, i + 1);
-    }
-    Mat3 spread;
-    for (std::size_t a = 0; a < 3; ++a) {
-        for (std::size_t b = 0; b < 3; ++b)
-            spread(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) =
-                dot(w.weighted.data() + a * kMaxModes, w.weighted.data() + b * kMaxModes, d);
-    }
-    const Mat3 narrowed = kept * spread;
-    const Mat3 covariance = r * kept + narrowed * kept.transpose();
-    return covariance.trace();
-}
-
-// What a marker that is not measured whole tells of itself.
-Mat3 own_weight(const FaceGaussian& face, const StabiliserOutput& stabilised, std::size_t k,
-                const InferenceWorkspace& w) {
-    const auto knowledge = static_cast<Knowledge>(w.knowledge[k]);
-    return knowledge == Knowledge::kHidden ? Mat3{Mat3::Zero()}
-                                           : weight_of(face, stabilised.markers[k], k, knowledge);
-}
-
-// The coefficients' normal equations.
-bool prepare_by_modes(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w) {
-    const std::size_t d = face.mode_count;
-    for (std::size_t i = 0; i < d; ++i) {
-        std::fill_n(w.system.data() + i * kStride, d, 0.0);
-        w.system[i * kStride + i] = 1.0;
-    }
+// The coefficients' normal equations, and the variance of what is not measured whole.
+bool prepare_by_modes(const FaceGaussian& face, const StabiliserOutput& stabilised, const Census& census,
+                      InferenceWorkspace& w) {
     for (std::size_t k = 0; k < face.marker_count; ++k) {
-        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kHidden) continue;
-        add_marker(face, k, own_weight(face, stabilised, k, w), w);
+        Mat3& weight = w.modes.weight[k];
+        switch (w.modes.knowledge[k]) {
+            case MarkerKnowledge::kHidden:
+                weight = Mat3::Zero();
+                break;
+            case MarkerKnowledge::kPartly:
+                weight = partial_weight(stabilised.markers[k].information, 1.0 / face.noise_mm2,
+                                        face.residual_mm2[k]);
+                break;
+            case MarkerKnowledge::kMeasured:
+                weight = face.measured_weight(k) * Mat3::Identity();
+                break;
+        }
     }
-    if (!inverse_of_factor(w.system.data(), d, kStride, w.inverse.data(), w.half.data())) return false;
-    for (std::size_t k = 0; k < face.marker_count; ++k) {
-        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kMeasured) continue;
-        w.variance_mm2[k] = variance_by_modes(face, k, own_weight(face, stabilised, k, w), w);
-    }
+    if (!factor_modes(face, w.modes)) return false;
+    find_variances(face, std::span(w.unmeasured).first(census.hidden + census.partly), w.modes,
+                   w.variance_mm2);
     return true;
 }
 
@@ -202,24 +166,21 @@ void put(const FaceGaussian& face, const StabilisedMarker& marker, std::size_t k
     output.confidence[k] = usual > 0.0 ? static_cast<float>(1.0 - std::sqrt(variance / usual)) : 1.0F;
 }
 
-struct Census {
-    std::size_t hidden = 0;
-    std::size_t partly = 0;
-};
-
 Census classify(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w) {
     const double nominal = 1.0 / face.noise_mm2;
     Census census;
     for (std::size_t k = 0; k < face.marker_count; ++k) {
         const StabilisedMarker& marker = stabilised.markers[k];
-        const Knowledge knowledge = knowledge_of(marker, nominal);
-        w.knowledge[k] = static_cast<std::uint8_t>(knowledge);
-        if (knowledge == Knowledge::kHidden) w.hidden[census.hidden++] = static_cast<std::uint16_t>(k);
-        if (knowledge == Knowledge::kPartly) ++census.partly;
+        const MarkerKnowledge knowledge = knowledge_of(marker, nominal);
+        w.modes.knowledge[k] = knowledge;
+        if (knowledge != MarkerKnowledge::kMeasured)
+            w.unmeasured[census.hidden + census.partly] = static_cast<std::uint16_t>(k);
+        if (knowledge == MarkerKnowledge::kHidden) w.hidden[census.hidden++] = static_cast<std::uint16_t>(k);
+        if (knowledge == MarkerKnowledge::kPartly) ++census.partly;
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const auto at = static_cast<Eigen::Index>(axis);
             w.error_mm[3 * k + axis] =
-                knowledge == Knowledge::kHidden ? 0.0 : marker.position_mm[at] - face.mean_mm[k][at];
+                knowledge == MarkerKnowledge::kHidden ? 0.0 : marker.position_mm[at] - face.mean_mm[k][at];
         }
     }
     return census;
@@ -241,27 +202,28 @@ void put_by_precision(const FaceGaussian& face, const StabiliserOutput& stabilis
 }
 
 // Mean of x: K M c + r W y.
-void put_by_modes(const FaceGaussian& face, const StabiliserOutput& stabilised, InferenceWorkspace& w,
-                  InferenceOutput& output) {
+void put_by_modes(const FaceGaussian& face, const StabiliserOutput& stabilised, const Census& census,
+                  InferenceWorkspace& w, InferenceOutput& output) {
     const std::size_t rows = 3U * face.marker_count;
+    const std::size_t d = face.mode_count;
     const auto error_of = [&](std::size_t k) {
         return Vec3{w.error_mm[3 * k], w.error_mm[3 * k + 1], w.error_mm[3 * k + 2]};
     };
     for (std::size_t k = 0; k < face.marker_count; ++k) {
-        const Vec3 weighted = own_weight(face, stabilised, k, w) * error_of(k);
+        const Vec3 weighted = w.modes.weight[k] * error_of(k);
         for (std::size_t axis = 0; axis < 3; ++axis)
             w.half[3 * k + axis] = weighted[static_cast<Eigen::Index>(axis)];
     }
-    combine_rows(face.modes.data(), kMaxModes, w.half.data(), rows, face.mode_count, nullptr, w.right.data());
-    solve_prepared(face.mode_count, w, w.right.data());
-    for (std::size_t k = 0; k < face.marker_count; ++k) {
-        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kMeasured) continue;
-        const Mat3 own = face.residual_mm2[k] * own_weight(face, stabilised, k, w);
+    combine_rows(face.modes.data(), kMaxModes, w.half.data(), rows, padded(d), nullptr, w.right.data());
+    solve_modes(face, w.modes, w.right.data());
+    for (std::size_t i = 0; i < census.hidden + census.partly; ++i) {
+        const std::size_t k = w.unmeasured[i];
         Vec3 predicted;
         for (std::size_t axis = 0; axis < 3; ++axis) {
             predicted[static_cast<Eigen::Index>(axis)] =
-                dot(face.mode_row(3 * k + axis), w.right.data(), face.mode_count);
+                padded_dot(face.mode_row(3 * k + axis), w.right.data(), padded(d));
         }
+        const Mat3 own = face.residual_mm2[k] * w.modes.weight[k];
         const Vec3 correction = own * (error_of(k) - predicted);
         put(face, stabilised.markers[k], k, face.mean_mm[k] + predicted + correction, w.variance_mm2[k],
             output);
@@ -271,7 +233,8 @@ void put_by_modes(const FaceGaussian& face, const StabiliserOutput& stabilised, 
 // What hides where decides all that prepare() works out, unless a marker is partly measured.
 bool is_prepared(const FaceGaussian& face, const Census& census, const InferenceWorkspace& w) {
     return w.prepared != Prepared::kNothing && census.partly == 0 &&
-           std::equal(w.knowledge.begin(), w.knowledge.begin() + face.marker_count, w.prepared_for.begin());
+           std::equal(w.modes.knowledge.begin(), w.modes.knowledge.begin() + face.marker_count,
+                      w.prepared_for.begin());
 }
 
 void prepare(const FaceGaussian& face, const StabiliserOutput& stabilised, const Census& census,
@@ -280,16 +243,17 @@ void prepare(const FaceGaussian& face, const StabiliserOutput& stabilised, const
     if (census.partly == 0 && precision_is_cheaper(face, census.hidden) &&
         prepare_by_precision(face, census.hidden, w)) {
         w.prepared = Prepared::kPrecision;
-    } else if (prepare_by_modes(face, stabilised, w)) {
+    } else if (prepare_by_modes(face, stabilised, census, w)) {
         w.prepared = Prepared::kModes;
     }
-    w.prepared_for = w.knowledge;
+    w.prepared_for = w.modes.knowledge;
 }
 
 }  // namespace
 
 void reset_inference(InferenceWorkspace& workspace) {
     workspace.prepared = Prepared::kNothing;
+    reset_modes(workspace.modes);
     workspace.error_mm.fill(0.0);
 }
 
@@ -312,13 +276,13 @@ void infer_missing(const FaceGaussian& face, const StabiliserOutput& stabilised,
             put_by_precision(face, stabilised, census.hidden, w, output);
             return;
         case Prepared::kModes:
-            put_by_modes(face, stabilised, w, output);
+            put_by_modes(face, stabilised, census, w, output);
             return;
         case Prepared::kNothing:  // not positive definite to working precision: the mean face
             break;
     }
     for (std::size_t k = 0; k < face.marker_count; ++k) {
-        if (static_cast<Knowledge>(w.knowledge[k]) == Knowledge::kMeasured) continue;
+        if (w.modes.knowledge[k] == MarkerKnowledge::kMeasured) continue;
         put(face, stabilised.markers[k], k, face.mean_mm[k], face.prior_mm2[k], output);
     }
 }

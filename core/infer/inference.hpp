@@ -8,6 +8,7 @@
 
 #include "core/infer/completed_markers.hpp"
 #include "core/infer/face_gaussian.hpp"
+#include "core/infer/mode_posterior.hpp"
 #include "core/stabilise/stabilised_markers.hpp"
 
 namespace rig {
@@ -20,17 +21,17 @@ struct InferenceWorkspace {
     enum class Prepared : std::uint8_t { kNothing = 0, kPrecision = 1, kModes = 2 };
 
     Prepared prepared = Prepared::kNothing;
-    std::array<std::uint8_t, kMaxMarkers> prepared_for{};    // knowledge of every marker
-    std::array<double, kMaxHiddenRows * kStride> inverse{};  // L^-1 of the hidden rows or of the modes
-    std::array<double, kMaxMarkers> variance_mm2{};          // trace of each unmeasured marker's posterior
+    std::array<MarkerKnowledge, kMaxMarkers> prepared_for{};
+    std::array<double, kMaxHiddenRows * kStride> inverse{};  // L^-1 of the hidden rows
+    ModePosterior modes;
+    std::array<double, kMaxMarkers> variance_mm2{};  // trace of each unmeasured marker's posterior
 
     std::array<double, kMaxHiddenRows * kStride> system{};
     std::array<double, kMaxRows> error_mm{};  // measured minus mean; 0 where nothing was measured
     std::array<double, kMaxRows> right{};
     std::array<double, kMaxRows> half{};
-    std::array<double, 3 * kMaxModes> weighted{};
     std::array<std::uint16_t, kMaxMarkers> hidden{};
-    std::array<std::uint8_t, kMaxMarkers> knowledge{};
+    std::array<std::uint16_t, kMaxMarkers> unmeasured{};  // hidden or partly measured
 };
 
 // To be called when `face` has been built anew.

@@ -222,7 +222,11 @@ void find_groups(std::size_t markers, std::size_t sightings, MatchingWorkspace& 
         }
     }
     // A marker's leader comes before it, so its own leader is final already.
-    for (std::size_t k = 0; k < markers; ++k) w.group[k] = w.group[w.group[k]];
+    for (std::size_t k = 0; k < markers; ++k) {
+        w.group[k] = w.group[w.group[k]];
+        w.group_size[k] = 0;
+        ++w.group_size[w.group[k]];
+    }
 }
 
 // Rows, columns and costs of the group that `leader` leads.
@@ -230,7 +234,7 @@ AssignmentProblem problem_of(std::size_t leader, std::size_t markers, double alo
                              MatchingWorkspace& w) {
     AssignmentProblem problem;
     problem.alone_cost = alone_cost;
-    for (std::size_t k = leader; k < markers; ++k) {
+    for (std::size_t k = leader; k < markers && problem.row_count < w.group_size[leader]; ++k) {
         if (w.group[k] != leader) continue;
         w.rows[problem.row_count++] = static_cast<std::uint16_t>(k);
         for (std::size_t i = w.pair_start[k]; i < w.pair_start[k + 1]; ++i)
@@ -257,9 +261,7 @@ AssignmentProblem problem_of(std::size_t leader, std::size_t markers, double alo
 
 void assign_group(std::size_t leader, std::size_t markers, double gate_mm, MatchingWorkspace& w,
                   std::span<std::int16_t> match) {
-    bool single = true;
-    for (std::size_t k = leader + 1; k < markers && single; ++k) single = w.group[k] != leader;
-    if (single) {
+    if (w.group_size[leader] == 1) {
         double least = gate_mm * gate_mm;
         for (std::size_t i = w.pair_start[leader]; i < w.pair_start[leader + 1]; ++i) {
             if (!(w.pair_cost[i] < least)) continue;
@@ -277,6 +279,13 @@ void assign_group(std::size_t leader, std::size_t markers, double gate_mm, Match
 }
 
 }  // namespace
+
+bool same_names(std::size_t marker_count, const SightingSet& sightings, const Matches& a, const Matches& b) {
+    for (std::size_t view = 0; view < sightings.view_count; ++view) {
+        if (!std::equal(a[view].begin(), a[view].begin() + marker_count, b[view].begin())) return false;
+    }
+    return true;
+}
 
 void find_left_over(std::size_t marker_count, const SightingSet& sightings, const Matches& matches,
                     LeftOverSightings& left_over) {

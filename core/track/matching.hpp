@@ -44,6 +44,7 @@ struct MatchingWorkspace {
     // Markers that compete for sightings, directly or through others, form a group, named by its first
     // marker.
     std::array<std::uint16_t, kMaxMarkers> group{};
+    std::array<std::uint16_t, kMaxMarkers> group_size{};     // by its first marker
     std::array<std::int16_t, kMaxSightings> first_marker{};  // that is near a sighting, -1 none
     std::array<std::uint16_t, kMaxMarkers> rows{};           // of one group
     std::array<std::uint16_t, kMaxSightings> columns{};
@@ -52,6 +53,9 @@ struct MatchingWorkspace {
     std::array<double, kMaxMarkers * kMaxSightings> cost{};
     AssignmentWorkspace assignment;
 };
+
+[[nodiscard]] bool same_names(std::size_t marker_count, const SightingSet& sightings, const Matches& a,
+                              const Matches& b);
 
 // Sightings of each view that no marker was given, rising.
 using LeftOverSightings = std::array<BoundedVector<std::uint16_t, kMaxSightings>, kMaxCameras>;

@@ -68,6 +68,15 @@ double match_nearest(std::size_t markers, const SightingSet& sightings, double g
     return score;
 }
 
+// What a start tells of the pose; its expression is the caller's.
+ShapePrior prior_around(const NamingReach& reach, const Rigid& pose) {
+    ShapePrior prior;
+    prior.pose = pose;
+    prior.rotation_sigma_rad = reach.rotation_sigma_rad;
+    prior.translation_sigma_mm = reach.translation_sigma_mm;
+    return prior;
+}
+
 }  // namespace
 
 void take_leading_modes(const ShapeModel& model, ShapeModel& coarse) {
@@ -82,11 +91,8 @@ void take_leading_modes(const ShapeModel& model, ShapeModel& coarse) {
 }
 
 double approach(const NamingReach& reach, const SightingSet& sightings, NamingWorkspace& w, ShapeFit& fit) {
-    ShapePrior prior;
-    prior.pose = fit.pose;
+    ShapePrior prior = prior_around(reach, fit.pose);
     prior.coefficients = fit.coefficients;
-    prior.rotation_sigma_rad = reach.rotation_sigma_rad;
-    prior.translation_sigma_mm = reach.translation_sigma_mm;
     prior.coefficient_sigma = 1.0;
     const std::size_t markers = w.coarse.marker_count;
     for (const double gate_mm : kApproachGatesMm) {
@@ -105,11 +111,8 @@ double approach(const NamingReach& reach, const SightingSet& sightings, NamingWo
 void run_rounds(const ShapeModel& model, const NamingReach& reach, const ShapeFit& start,
                 const SightingSet& sightings, NamingWorkspace& w) {
     w.trial = start;
-    ShapePrior prior;
-    prior.pose = start.pose;
+    ShapePrior prior = prior_around(reach, start.pose);
     prior.coefficients = start.coefficients;
-    prior.rotation_sigma_rad = reach.rotation_sigma_rad;
-    prior.translation_sigma_mm = reach.translation_sigma_mm;
     for (const Round& round : kRounds) {
         predict(model, w.trial, w);
         match_views(predicted(model, w), sightings, round.gate_mm, w.matching, w.matches);
@@ -128,10 +131,7 @@ void run_rounds(const ShapeModel& model, const NamingReach& reach, const ShapeFi
 
 void fit_to_names(const ShapeModel& model, const NamingReach& reach, const ShapeFit& start,
                   const SightingSet& sightings, const Matches& matches, NamingWorkspace& w) {
-    ShapePrior prior;
-    prior.pose = start.pose;
-    prior.rotation_sigma_rad = reach.rotation_sigma_rad;
-    prior.translation_sigma_mm = reach.translation_sigma_mm;
+    ShapePrior prior = prior_around(reach, start.pose);
     prior.coefficient_sigma = kRounds.back().coefficient_sigma;
     w.matches = matches;
     predict(model, start, w);

@@ -34,13 +34,6 @@ bool left_over_beside_unseen(const ShapeModel& model, std::span<const Vec3> pred
     return false;
 }
 
-bool same_names(const ShapeModel& model, const SightingSet& sightings, const Matches& a, const Matches& b) {
-    for (std::size_t view = 0; view < sightings.view_count; ++view) {
-        if (!std::equal(a[view].begin(), a[view].begin() + model.marker_count, b[view].begin())) return false;
-    }
-    return true;
-}
-
 ShapeFit start_of(const ShapeModel& coarse, const ShapeFit& fit, std::uint8_t opinion) {
     ShapeFit start;
     start.pose = fit.pose;
@@ -93,7 +86,7 @@ bool second_opinion(const ShapeModel& model, const ShapeFit& fit, const Sighting
     ShapeFit start = start_of(w.coarse, fit, opinion);
     approach(kReach, sightings, w, start);
     run_rounds(model, kReach, start, sightings, w);
-    if (!w.trial.ok || same_names(model, sightings, matches, w.matches)) return false;
+    if (!w.trial.ok || same_names(model.marker_count, sightings, matches, w.matches)) return false;
     const double other_mm2 = naming_cost_mm2(model, sightings, w.matches, w);
     return other_mm2 + kLeastGainMm2 < present_mm2 && other_mm2 < kMostShare * present_mm2;
 }

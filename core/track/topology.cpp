@@ -94,10 +94,9 @@ void build_topology(const ShapeModel& model, Topology& topology) {
     }
 }
 
-std::uint16_t find_broken_order(const Topology& topology, const Mat3& face_from_headset,
+std::uint16_t find_broken_order(const Topology& topology, const Mat3& headset_from_face,
                                 const NamedMarkers& named, std::array<bool, kMaxMarkers>& broken) {
     broken.fill(false);
-    const Mat3 headset_from_face = face_from_headset.transpose();
     std::uint16_t count = 0;
     for (const NeighbourPair& pair : topology.pairs) {
         const NamedMarker& first = named.markers[pair.first];

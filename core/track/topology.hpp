@@ -36,8 +36,8 @@ struct Topology {
 void build_topology(const ShapeModel& model, Topology& topology);
 
 // broken[k]: marker k and a neighbour of it, both seen, have changed places along their line.
-// face_from_headset: a rotation. Returns how many pairs have.
-std::uint16_t find_broken_order(const Topology& topology, const Mat3& face_from_headset,
+// headset_from_face: a rotation. Returns how many pairs have.
+std::uint16_t find_broken_order(const Topology& topology, const Mat3& headset_from_face,
                                 const NamedMarkers& named, std::array<bool, kMaxMarkers>& broken);
 
 }  // namespace rig

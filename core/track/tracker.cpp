@@ -198,16 +198,6 @@ void count_changes(const ShapeModel& model, const SightingSet& sightings, const 
     }
 }
 
-// Then the fit stands: what the views say across their rays does not depend on what was predicted.
-bool same_names(const ShapeModel& model, const SightingSet& sightings, const Matches& a, const Matches& b) {
-    for (std::size_t view = 0; view < sightings.view_count; ++view) {
-        for (std::size_t k = 0; k < model.marker_count; ++k) {
-            if (a[view][k] != b[view][k]) return false;
-        }
-    }
-    return true;
-}
-
 void clear_matches(Matches& matches) {
     for (auto& view : matches) view.fill(-1);
 }
@@ -240,8 +230,9 @@ void name_sightings(const ShapeModel& model, const TrackerConfig& config, const 
     velocity = row_velocity(model, config, sightings, state, &w.next, w);
     match_views(predicted(model, w), sightings, config.final_gate_mm, w.matching, w.matches, velocity);
     combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
-    // With a rolling shutter the positions have moved with the new velocities, whatever the names.
-    if (!velocity.empty() || !same_names(model, sightings, w.matches, w.fitted_matches)) {
+    // With the same names the fit stands: what the views say across their rays does not depend on what was
+    // predicted. With a rolling shutter the positions have moved with the new velocities, whatever the names.
+    if (!velocity.empty() || !same_names(model.marker_count, sightings, w.matches, w.fitted_matches)) {
         fit_face(model, config, state, named, w);
     }
 }
@@ -271,8 +262,7 @@ void hear_opinion(const ShapeModel& model, const TrackerConfig& config, const Si
 // Of neighbours that have changed places one name at least is wrong: both wait until the face says which.
 void reject_broken_order(const ShapeModel& model, const TrackerState& state, NamedMarkers& named,
                          TrackerWorkspace& w, TrackerReport& report) {
-    const Mat3 face_from_headset = w.next.pose.rotation.transpose();
-    report.order_broken = find_broken_order(state.topology, face_from_headset, named, w.broken);
+    report.order_broken = find_broken_order(state.topology, w.next.pose.rotation, named, w.broken);
     if (report.order_broken == 0) return;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         if (!w.broken[k]) continue;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/math.hpp"
+#include "core/infer/inference.hpp"
 #include "core/stabilise/similarity_2d.hpp"
 #include "core/stabilise/stabiliser.hpp"
 #include "core/track/tracker.hpp"
@@ -47,10 +48,16 @@ struct RandomFace {
         const std::vector<float> sigma(kShapes, 0.3F);
         auto scratch = std::make_unique<ShapeModelWorkspace>();
         build_shape_model(neutral, basis, mean, sigma, *scratch, *model);
+        SolvePack pack;
+        pack.marker_count = kMarkers;
+        pack.noise_mm = 0.1F;
+        auto gaussian_scratch = std::make_unique<FaceGaussianWorkspace>();
+        build_face_gaussian(pack, *model, *gaussian_scratch, *gaussian);
     }
 
     std::vector<Vec3> neutral_mm;
     std::unique_ptr<ShapeModel> model = std::make_unique<ShapeModel>();
+    std::unique_ptr<FaceGaussian> gaussian = std::make_unique<FaceGaussian>();
 };
 
 CameraModel camera_at(const Vec3& centre_mm) {
@@ -75,6 +82,8 @@ struct Stream {
     TrackerReport tracked;
     StabiliserOutput output;
     StabiliserReport stabilised;
+    InferenceWorkspace inference;
+    InferenceOutput completed;
 
     void step(const RandomFace& face, test::Digest& digest) {
         TrackerConfig config;
@@ -92,6 +101,16 @@ struct Stream {
         add(digest, output.headset_from_face.translation_mm);
         for (int i = 0; i < 9; ++i) digest.add(output.headset_from_face.rotation(i / 3, i % 3));
         for (std::size_t j = 0; j < face.model->mode_count; ++j) digest.add(output.fit.coefficients[j]);
+        if (output.count == kMarkers) add_completed(face, digest);
+    }
+
+  private:
+    void add_completed(const RandomFace& face, test::Digest& digest) {
+        infer_missing(*face.gaussian, output, inference, completed);
+        for (std::size_t k = 0; k < kMarkers; ++k) {
+            add(digest, completed.position_mm[k]);
+            digest.add(static_cast<double>(completed.deviation_mm[k]));
+        }
     }
 };
 

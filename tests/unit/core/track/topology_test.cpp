@@ -16,13 +16,13 @@ struct Scene {
         model = test::shape_model_of(face.pack());
         build_topology(*model, *topology);
     }
-    std::uint16_t broken(const std::vector<Vec3>& positions, const Mat3& face_from_headset) {
+    std::uint16_t broken(const std::vector<Vec3>& positions, const Mat3& headset_from_face) {
         for (std::size_t k = 0; k < positions.size(); ++k) {
             named->markers[k] = NamedMarker{};
             named->markers[k].seen = true;
             named->markers[k].position_mm = positions[k];
         }
-        return find_broken_order(*topology, face_from_headset, *named, flags);
+        return find_broken_order(*topology, headset_from_face, *named, flags);
     }
 
     test::SyntheticFace face;
@@ -62,7 +62,7 @@ TEST(Topology, ExpressionsAndSlipsBreakNoOrder) {
             const Rigid pose = test::random_slip(random, 0.3, 10.0);
             const std::vector<Vec3> positions =
                 test::moved(pose, s.face.positions(s.face.weights_at(random.uniform(0.0, 1000.0))));
-            EXPECT_EQ(s.broken(positions, pose.rotation.transpose()), 0) << markers;
+            EXPECT_EQ(s.broken(positions, pose.rotation), 0) << markers;
         }
     }
 }
@@ -74,7 +74,7 @@ TEST(Topology, EveryExchangeOfNeighboursBreaksIt) {
     for (const NeighbourPair& pair : s.topology->pairs) {
         std::vector<Vec3> positions = test::moved(pose, s.face.positions(s.face.weights_at(3.0)));
         std::swap(positions[pair.first], positions[pair.second]);
-        EXPECT_GE(s.broken(positions, pose.rotation.transpose()), 1) << pair.first << " " << pair.second;
+        EXPECT_GE(s.broken(positions, pose.rotation), 1) << pair.first << " " << pair.second;
         EXPECT_TRUE(s.flags[pair.first] && s.flags[pair.second]);
     }
 }
