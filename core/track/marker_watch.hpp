@@ -23,7 +23,10 @@ struct MarkerWatchConfig {
     double rate_hz = 60.0;
     double fallen_s = 5.0;   // unseen although it should be seen
     double astray_s = 1.0;   // a sighting without a name keeps its place beside an unseen marker
-    double astray_mm = 6.0;  // ... within this of it
+    double astray_mm = 6.0;  // ... within this of it; nor is a marker ever taken to have moved farther
+    // Squared steps that show whether a sighting moves with the face or stands still under the helmet: by how
+    // much the ones must exceed the others. A face at rest shows neither; then it takes three times as long.
+    double astray_steps_mm2 = 10.0;
     // Off the face, which bends after a marker that slid: 3 mm show as 1.8 and more, but for the corners of
     // the lips, which it follows almost whole (headrig experiment identity-troubles). Right ones stay within
     // 0.05 on the public takes.
@@ -38,6 +41,8 @@ struct MarkerWatchState {
     std::array<std::uint16_t, kMaxMarkers> absent_ticks{};
     std::array<std::uint16_t, kMaxMarkers> astray_ticks{};
     std::array<Vec3, kMaxMarkers> astray_mm{};          // from the expected place, face frame
+    std::array<Vec3, kMaxMarkers> astray_place_mm{};    // headset frame
+    std::array<double, kMaxMarkers> astray_steps_mm2{};  // about that place less about the face's, squared
     std::array<std::uint8_t, kMaxMarkers> off_count{};  // expressions in which it stood off, less the others
     std::array<double, kMaxModes> last_expression{};
 };

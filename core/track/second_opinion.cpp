@@ -60,6 +60,12 @@ void ask_for_opinions(SecondOpinionState& state) {
     state.suspicion = 0;
 }
 
+void take_opinion(SecondOpinionState& state) {
+    state.suspicion = 0;
+    state.pause = 0;
+    state.next_pause = 0;
+}
+
 void suspect(const ShapeModel& model, std::span<const Vec3> predicted_mm, const SightingSet& sightings,
              const Matches& matches, const LeftOverSightings& left_over, bool odd,
              SecondOpinionState& state) {

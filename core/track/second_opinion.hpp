@@ -25,6 +25,9 @@ struct SecondOpinionState {
 // Every opinion is asked for in the frames that follow.
 void ask_for_opinions(SecondOpinionState& state);
 
+// One was better: suspicion was right, and is listened to as at first.
+void take_opinion(SecondOpinionState& state);
+
 // Of one frame and its final names. `odd`: something else about the names is wrong. Suspicion that lasts asks
 // for opinions; when they change nothing, ever more time passes before the next.
 void suspect(const ShapeModel& model, std::span<const Vec3> predicted_mm, const SightingSet& sightings,

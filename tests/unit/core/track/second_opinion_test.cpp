@@ -123,6 +123,17 @@ TEST(SecondOpinion, SuspicionThatComesToNothingAsksEverLessOften) {
     EXPECT_GE(before, 900);
 }
 
+TEST(SecondOpinion, SuspicionThatWasRightIsHeardAsAtFirst) {
+    Scene s;
+    s.see(s.truth);
+    SecondOpinionState state;
+    for (int i = 0; i < 6; ++i) {
+        EXPECT_EQ(frames_until_asked(s, s.right, true, 2000, state), 8) << i;
+        take_opinion(state);
+        state.left = 0;
+    }
+}
+
 TEST(SecondOpinion, FarAwayIsNotBeside) {
     Scene s;
     std::vector<Vec3> points = s.truth;
