@@ -142,13 +142,41 @@ bool is_new_expression(const ShapeModel& model, const MarkerWatchConfig& config,
 }
 
 // An expression for or against a seen marker that stands off.
-void count_off(double off_mm, const MarkerWatchConfig& config, std::size_t k, MarkerWatchState& state) {
+void count_off(bool stands_off, const MarkerWatchConfig& config, std::size_t k, MarkerWatchState& state) {
     std::uint8_t& count = state.off_count[k];
-    if (off_mm > config.slid_mm) {
+    if (stands_off) {
         if (count < config.slid_expressions) ++count;
         if (count == config.slid_expressions) state.trouble[k] = MarkerTrouble::kSlid;
     } else if (count > 0 && --count == 0 && state.trouble[k] == MarkerTrouble::kSlid) {
         state.trouble[k] = MarkerTrouble::kNone;
+    }
+}
+
+// Every seen marker, in an expression that counts. Those known to have slid do not hide others: the face does
+// not bend after them any more.
+void count_all_off(const ShapeModel& model, const MarkerWatchConfig& config, const WatchedFrame& frame,
+                   std::span<const Vec3> neutral_offset_mm, std::span<const Vec3> bias_mm,
+                   MarkerWatchState& state) {
+    std::array<double, kMaxMarkers> off_mm{};
+    std::size_t farthest = model.marker_count;
+    double most_mm = 0.0;
+    double next_mm = 0.0;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        if (!frame.named.markers[k].seen) continue;
+        off_mm[k] = off_its_place_mm(frame.fit.pose, neutral_offset_mm, bias_mm[k], k);
+        if (state.trouble[k] == MarkerTrouble::kSlid) continue;
+        if (off_mm[k] > most_mm) {
+            next_mm = most_mm;
+            most_mm = off_mm[k];
+            farthest = k;
+        } else {
+            next_mm = std::max(next_mm, off_mm[k]);
+        }
+    }
+    const bool stands_out = most_mm > config.slid_alone_mm && most_mm >= config.alone_ratio * next_mm;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        if (!frame.named.markers[k].seen) continue;
+        count_off(off_mm[k] > config.slid_mm || (k == farthest && stands_out), config, k, state);
     }
 }
 
@@ -175,9 +203,8 @@ void watch_markers(const ShapeModel& model, const Topology& topology, const Mark
         state.absent_ticks[k] = 0;
         state.astray_ticks[k] = 0;
         if (state.trouble[k] == MarkerTrouble::kFallen) state.trouble[k] = MarkerTrouble::kNone;
-        if (!counts) continue;
-        count_off(off_its_place_mm(frame.fit.pose, neutral_offset_mm, bias_mm[k], k), config, k, state);
     }
+    if (counts) count_all_off(model, config, frame, neutral_offset_mm, bias_mm, state);
 }
 
 }  // namespace rig

@@ -23,11 +23,11 @@ constexpr std::uint8_t kSuspicious = 8;
 constexpr std::uint16_t kFirstPause = 8;  // frames; doubled up to the longest
 constexpr std::uint16_t kLongestPause = 960;
 constexpr double kLeastGainMm2 = 0.5 * kNamingGateMm * kNamingGateMm;
-constexpr double kMostShare = 0.9;  // of what the present names leave
-constexpr double kRivalMm = 6.0;    // from a sighting to the face's place of an unseen marker
+constexpr double kMostShare = 0.9;   // of what the present names leave
+constexpr double kRivalMm = 6.0;     // from a sighting to the face's place of an unseen marker
 constexpr double kLeastOffMm = 0.3;  // of a named marker from its sighting, to be doubted
-// In a fit's objective, sighting and expression together. Found on 140 synthetic starts, one and two cameras: of
-// names that were right none gained more than 0.3, of wrong ones most 1.5 to 11.
+// In a fit's objective, sighting and expression together. Found on 140 synthetic starts, one and two cameras:
+// of names that were right none gained more than 0.3, of wrong ones most 1.5 to 11.
 constexpr double kRivalGain = 1.0;
 constexpr std::size_t kMostRivals = 4;  // of an opinion
 
@@ -95,13 +95,11 @@ void find_rivals(const ShapeModel& model, const SightingSet& sightings, const Ma
     }
 }
 
-// After fit_to_names() with the present names. True: one of the rivals has a better claim; the names and the
+// True: one of the rivals has a better claim, the face's objective is less than `wanted`; the names and the
 // face are then in the workspace.
 bool hear_rivals(const ShapeModel& model, const ShapeFit& fit, const SightingSet& sightings,
-                 const Matches& matches, std::uint8_t opinion, NamingWorkspace& w) {
-    Rivals rivals;
-    find_rivals(model, sightings, matches, {w.predicted_mm.data(), model.marker_count}, rivals);
-    const double wanted = w.trial.objective - kRivalGain;
+                 const Matches& matches, std::uint8_t opinion, const Rivals& rivals, double wanted,
+                 NamingWorkspace& w) {
     for (std::size_t i = 0; i < std::min(rivals.size(), kMostRivals); ++i) {
         const Rival& rival = rivals[(opinion * kMostRivals + i) % rivals.size()];
         Matches other = matches;
@@ -154,14 +152,18 @@ bool second_opinion(const ShapeModel& model, const ShapeFit& fit, const Sighting
                     const Matches& matches, std::uint8_t opinion, NamingWorkspace& w) {
     fit_to_names(model, kReach, fit, sightings, matches, w);
     const double present_mm2 = naming_cost_mm2(model, sightings, matches, w);
-    if (hear_rivals(model, fit, sightings, matches, opinion, w)) return true;
+    const double wanted = w.trial.objective - kRivalGain;
+    Rivals rivals;
+    find_rivals(model, sightings, matches, {w.predicted_mm.data(), model.marker_count}, rivals);
     take_leading_modes(model, w.coarse);
     ShapeFit start = start_of(w.coarse, fit, opinion);
     approach(kReach, sightings, w, start);
     run_rounds(model, kReach, start, sightings, w);
-    if (!w.trial.ok || same_names(model, sightings, matches, w.matches)) return false;
-    const double other_mm2 = naming_cost_mm2(model, sightings, w.matches, w);
-    return other_mm2 + kLeastGainMm2 < present_mm2 && other_mm2 < kMostShare * present_mm2;
+    if (w.trial.ok && !same_names(model, sightings, matches, w.matches)) {
+        const double other_mm2 = naming_cost_mm2(model, sightings, w.matches, w);
+        if (other_mm2 + kLeastGainMm2 < present_mm2 && other_mm2 < kMostShare * present_mm2) return true;
+    }
+    return hear_rivals(model, fit, sightings, matches, opinion, rivals, wanted, w);
 }
 
 }  // namespace rig

@@ -114,8 +114,8 @@ void withhold(std::size_t k, NamedMarkers& named, TrackerWorkspace& w) {
     for (auto& view : w.matches) view[k] = -1;
 }
 
-// Who comes back a little off waits a frame, who had come off the face half a second. Frames in between that do
-// not show it in its place put off its return without beginning it anew: a marker may flicker.
+// Who comes back a little off waits a frame, who had come off the face half a second. Frames in between that
+// do not show it in its place put off its return without beginning it anew: a marker may flicker.
 void hold_returns(const ShapeModel& model, const TrackerConfig& config, TrackerState& state,
                   NamedMarkers& named, TrackerWorkspace& w) {
     for (std::size_t k = 0; k < model.marker_count; ++k) {
@@ -314,8 +314,9 @@ bool shows_a_face(const ShapeModel& model, const TrackerConfig& config, const Na
 
 void notice_loss(const ShapeModel& model, const TrackerConfig& config, TrackerState& state,
                  TrackerReport& report) {
-    state.poor_frames =
-        report.seen < least_seen(model, config) ? static_cast<std::uint16_t>(state.poor_frames + 1) : std::uint16_t{0};
+    state.poor_frames = report.seen < least_seen(model, config)
+                            ? static_cast<std::uint16_t>(state.poor_frames + 1)
+                            : std::uint16_t{0};
     if (state.poor_frames >= config.lost_frames) reset_tracker(state);
     report.tracking = state.tracking;
 }

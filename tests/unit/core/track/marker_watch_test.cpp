@@ -179,8 +179,7 @@ TEST(MarkerWatch, GhostsDoNotLeadAMarkerAwayStepByStep) {
             if (frame == 100) s.hidden.push_back(marker);
             if (frame >= 100) {
                 const Vec3 aside = (1 + (frame - 100) / 200) * step;
-                s.ghosts.push_back(
-                    test::creeping_slip(frame / 60.0).apply(s.face_at(frame)[marker] + aside));
+                s.ghosts.push_back(test::creeping_slip(frame / 60.0).apply(s.face_at(frame)[marker] + aside));
             }
             s.step(frame, marker, false, Vec3::Zero());
             EXPECT_LE(s.state->bias_mm[marker].norm(), s.config.watch.astray_mm) << marker << " at " << frame;
@@ -253,6 +252,35 @@ TEST_P(MarkerThatSlides, IsFlaggedWithItsWeightReducedAndTheOthersAreNot) {
     }
 }
 INSTANTIATE_TEST_SUITE_P(Frames, MarkerThatSlides, testing::Values(1, 300));
+
+// A corner of the lips that slid, which the face follows: its neighbours stand off by half as much. Others
+// that stand off as far are a face that the model does not quite fit.
+TEST(MarkerWatch, AMarkerThatStandsOffMuchFartherThanAnyOtherHasSlid) {
+    Scene s;
+    build_topology(*s.model, s.state->topology);
+    const std::vector<Vec3> face = s.face.positions(std::vector<double>(s.face.shape_count(), 0.0));
+    for (std::size_t k = 0; k < 60; ++k) s.named->markers[k].seen = true;
+    s.sightings->clear();
+    add_point_view(face, 0.1, *s.sightings);
+    const auto flagged = [&](double off_mm, double next_mm) {
+        MarkerWatchState state;
+        std::vector<Vec3> bias(60, Vec3::Zero());
+        bias[17] = Vec3{off_mm, 0.0, 0.0};
+        bias[18] = Vec3{0.0, next_mm, 0.0};
+        ShapeFit fit;
+        for (int expression = 0; expression < 30; ++expression) {
+            fit.coefficients[0] = expression % 2 == 0 ? 1.5 : -1.5;
+            watch_markers(*s.model, s.state->topology, {},
+                          {face, *s.sightings, s.workspace->left_over, *s.named, fit}, {}, bias, state);
+        }
+        EXPECT_EQ(state.trouble[18], MarkerTrouble::kNone);
+        return state.trouble[17] == MarkerTrouble::kSlid;
+    };
+    EXPECT_TRUE(flagged(1.05, 0.66));
+    EXPECT_FALSE(flagged(1.05, 0.85));
+    EXPECT_FALSE(flagged(0.7, 0.1));
+    EXPECT_TRUE(flagged(1.3, 1.1));
+}
 
 TEST(MarkerWatch, TheNeutralExplainsAnOffset) {
     Scene s;

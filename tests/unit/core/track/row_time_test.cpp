@@ -65,7 +65,8 @@ class RollingScene {
             double nearest = 1e9;
             for (std::size_t k = 0; k < model_->marker_count; ++k) {
                 const double apart = (state_->position_mm[k] - state_->position_mm[row[i - 1]]).norm();
-                if (std::find(row.begin(), row.begin() + i, k) != row.begin() + i || apart >= nearest) continue;
+                if (std::find(row.begin(), row.begin() + i, k) != row.begin() + i || apart >= nearest)
+                    continue;
                 nearest = apart;
                 row[i] = k;
             }
