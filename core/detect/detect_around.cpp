@@ -234,14 +234,18 @@ bool Detector::search_windows(const ImageView& image, Side side, std::span<const
 void Detector::detect_around(const ImageView& image, std::span<const ExpectedMarker> expected,
                              Observations& observations, DetectorReport& report) {
     const bool knows = is_processable(image) && is_settled() && state_.usual_size_px > 0.0;
-    const std::size_t side = likely_side();
-    if (!knows || !search_windows(image, kSides[side], expected, workspace_.sides[side])) {
+    if (!knows) {
         detect(image, observations, report);
         return;
     }
     observations.clear();
     report = DetectorReport{};
-    measure_exposure(image, report);
+    measure_exposure(image, report);  // first: the least contrast is that of this frame's light
+    const std::size_t side = likely_side();
+    if (!search_windows(image, kSides[side], expected, workspace_.sides[side])) {
+        detect_whole(image, observations, report);
+        return;
+    }
     add_counts(report, workspace_.sides[side].report);
     finish(side, observations, report);
 }

@@ -544,9 +544,13 @@ void Detector::detect(const ImageView& image, Observations& observations, Detect
         report.unprocessable = true;
         return;
     }
+    measure_exposure(image, report);
+    detect_whole(image, observations, report);
+}
+
+void Detector::detect_whole(const ImageView& image, Observations& observations, DetectorReport& report) {
     report.whole_image = true;
     const BlockGrid means = block_means(image, workspace_.means);
-    measure_exposure(image, report);  // whose rows are now at hand
     finish(look(image, means, report), observations, report);
 }
 

@@ -198,6 +198,8 @@ class Detector {
     static void drop_repeats(std::size_t first, SideResult& result);
     [[nodiscard]] bool is_settled() const;
     [[nodiscard]] std::size_t likely_side() const;
+    // What detect() does when the light is measured.
+    void detect_whole(const ImageView& image, Observations& observations, DetectorReport& report);
     void finish(std::size_t side, Observations& observations, DetectorReport& report);
     void examine_pieces(const Search& search, SideResult& result);
     static void drop_pieces(SideResult& result);

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kTicksOfPatience = 6.0;
 constexpr double kUsualGhosts = 3.0;    // false dots in a view
+constexpr double kBesideMm = 15.0;      // from a marker to a sighting that may be its own
 constexpr double kLeastStepRad = 0.14;  // 8 degrees, of the rotations that are voted for
 
 constexpr double kSameStartMm = 2.0;  // starts nearer to each other than this are one
@@ -111,6 +112,28 @@ bool better(const BootstrapReport& a, const BootstrapReport& b) {
     return score_a > score_b;
 }
 
+bool agrees(const ShapeModel& model, const SightingSet& sightings, const Matches& a, const Matches& b) {
+    for (std::size_t view = 0; view < sightings.view_count; ++view)
+        if (!std::equal(a[view].begin(), a[view].begin() + model.marker_count, b[view].begin())) return false;
+    return true;
+}
+
+// No sighting without a name lies beside a marker without one: they are all ghosts.
+bool nothing_else_to_name(const ShapeModel& model, const SightingSet& sightings, const NamingWorkspace& w) {
+    LeftOverSightings left_over;
+    find_left_over(model.marker_count, sightings, w.matches, left_over);
+    for (std::size_t view = 0; view < sightings.view_count; ++view) {
+        for (const std::uint16_t j : left_over[view]) {
+            for (std::size_t k = 0; k < model.marker_count; ++k) {
+                if (w.matches[view][k] < 0 &&
+                    sightings.views[view][j].squared_distance_mm2(w.predicted_mm[k]) < kBesideMm * kBesideMm)
+                    return false;
+            }
+        }
+    }
+    return true;
+}
+
 // A face that explains nearly everything is believed at once; one that explains less only when some ticks of
 // search have found no better.
 double wanted_explained(const BootstrapConfig& config, const SightingSet& sightings,
@@ -135,19 +158,31 @@ BootstrapReport bootstrap(const ShapeModel& model, const BootstrapConfig& config
     const double wanted = wanted_explained(config, sightings, state);
     find_starts(model, config, nominal, sightings, workspace);
     const std::size_t count = workspace.starts.size();
+    bool contended = false;  // by a start that explains enough ...
+    bool by_best = false;    // ... and is the best one
+    bool only = true;        // names that the tick's starts come to, and no sighting that asks for others
     for (int i = 0; i < config.starts_per_frame && count > 0; ++i) {
         NamingWorkspace& naming = workspace.naming;
         run_rounds(model, reach_of(config), workspace.starts[state.next_start++ % count].fit, sightings,
                    naming);
         const BootstrapReport report = judge(model, config, wanted, sightings, naming);
+        const bool contends = judge(model, config, config.accept_explained, sightings, naming).found;
+        if (contends) {
+            if (!contended) workspace.first_names = naming.matches;
+            contended = true;
+            only = only && agrees(model, sightings, workspace.first_names, naming.matches) &&
+                   nothing_else_to_name(model, sightings, naming);
+        }
         if (i == 0 || better(report, best)) {
             best = report;
+            by_best = contends;
             fit = naming.trial;
         }
         const bool beyond_doubt = best.explained >= config.accept_explained_at_once &&
                                   best.residual_mm <= 0.5 * config.accept_residual_mm;
         if (best.found && beyond_doubt) break;
     }
+    if (by_best && only && best.residual_mm <= 0.5 * config.accept_residual_mm) best.found = true;
     state.ticks = static_cast<std::uint16_t>(std::min(state.ticks + 1, 60000));
     if (best.found) state = BootstrapState{};
     return best;

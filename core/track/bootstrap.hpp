@@ -20,9 +20,9 @@ struct BootstrapConfig {
     double translation_sigma_mm = 12.0;
     int starts_per_frame = 3;  // bounds the work of a tick; the next tick goes on with the next starts
     double accept_explained_at_once = 0.96;  // of the sightings
-    double accept_explained = 0.85;          // ... when several ticks of search found no better
-    double accept_seen = 0.5;                // of the markers
-    double accept_residual_mm = 1.2;         // rms after the last round
+    double accept_explained = 0.85;  // ... when several ticks of search found no better, or none is thinkable
+    double accept_seen = 0.5;        // of the markers
+    double accept_residual_mm = 1.2;  // rms after the last round
 };
 
 struct BootstrapState {
@@ -38,6 +38,7 @@ struct BootstrapStart {
 
 struct BootstrapWorkspace {
     NamingWorkspace naming;
+    Matches first_names{};  // of the tick's first start that explains enough
     PoseVotesWorkspace votes;
     BoundedVector<PoseCandidate, kPoseCandidates> candidates;
     BoundedVector<BootstrapStart, kPoseCandidates> starts;

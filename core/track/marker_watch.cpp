@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kSamePlaceMm = 1.0;        // of a sighting from frame to frame
 constexpr double kAstrayLearning = 0.05;    // per frame
+constexpr int kAtRest = 3;                  // times as long as usual, beside a face that does not move
+constexpr double kBorderPx = 8.0;           // a dot nearer to the picture's border is cut off
 constexpr double kDepthInformation = 1e-3;  // 1/mm^2 of the expected place, along a single ray
 constexpr std::uint16_t kMostTicks = 60000;
 constexpr std::size_t kSeenNeighbours = 3;  // of kNeighbours
@@ -26,16 +28,25 @@ std::uint16_t one_more(std::uint16_t ticks) {
     return ticks < kMostTicks ? static_cast<std::uint16_t>(ticks + 1) : ticks;
 }
 
+bool is_inside_picture(const CameraModel& camera, const Vec3& at_mm) {
+    const Projection seen = project(camera, at_mm);
+    return seen.z_mm > 0.0 && seen.pixel[0] >= kBorderPx && seen.pixel[1] >= kBorderPx &&
+           seen.pixel[0] <= camera.width_px - 1 - kBorderPx &&
+           seen.pixel[1] <= camera.height_px - 1 - kBorderPx;
+}
+
 bool faces_a_view(const Topology& topology, double least_cosine, const WatchedFrame& frame, std::size_t k) {
     if (!frame.sightings.from_cameras) return true;
     const Vec3 normal = frame.fit.pose.rotation * topology.normal[k];
     for (std::size_t view = 0; view < frame.sightings.view_count; ++view) {
-        const ViewSightings& seen = frame.sightings.views[view];
-        if (seen.empty()) continue;
-        const Vec3 to_camera = seen[0].point_mm - frame.expected_mm[k];
+        if (frame.sightings.views[view].empty()) continue;
+        const CameraModel& camera = frame.sightings.cameras[view];
+        const Vec3 to_camera = camera.centre_mm - frame.expected_mm[k];
         const double along = normal.dot(to_camera);
         const double squared = to_camera.dot(to_camera);
-        if (along > 0.0 && along * along >= least_cosine * least_cosine * squared) return true;
+        if (along > 0.0 && along * along >= least_cosine * least_cosine * squared &&
+            is_inside_picture(camera, frame.expected_mm[k]))
+            return true;
     }
     return false;
 }
@@ -70,29 +81,52 @@ bool find_astray(double reach_mm, const WatchedFrame& frame, std::size_t k, Vec3
     return point.gap_mm <= kSamePlaceMm;
 }
 
-void watch_unseen(const Topology& topology, const MarkerWatchConfig& config, const WatchedFrame& frame,
-                  std::size_t k, std::span<Vec3> bias_mm, MarkerWatchState& state) {
-    if (should_be_seen(topology, config.facing_cosine, frame, k))
-        state.absent_ticks[k] = one_more(state.absent_ticks[k]);
-    if (state.absent_ticks[k] >= ticks_of(config.fallen_s, config.rate_hz))
-        state.trouble[k] = MarkerTrouble::kFallen;
+// Whether a sighting that has kept its place beside a marker is the marker: it moves with the face.
+bool is_marker_astray(const MarkerWatchConfig& config, std::size_t k, const MarkerWatchState& state) {
+    const std::uint16_t enough = ticks_of(config.astray_s, config.rate_hz);
+    if (state.astray_ticks[k] < enough) return false;
+    if (state.astray_steps_mm2[k] >= config.astray_steps_mm2) return true;
+    return state.astray_ticks[k] >= kAtRest * enough && state.astray_steps_mm2[k] > -config.astray_steps_mm2;
+}
+
+// A marker that should be seen and is not may be the sighting beside its place that has no name.
+void watch_astray(const MarkerWatchConfig& config, const WatchedFrame& frame,
+                  std::span<const Vec3> neutral_offset_mm, std::size_t k, std::span<Vec3> bias_mm,
+                  MarkerWatchState& state) {
     Vec3 position_mm = Vec3::Zero();
     std::uint16_t& ticks = state.astray_ticks[k];
     if (!find_astray(config.astray_mm, frame, k, position_mm)) {
         if (ticks > 0) --ticks;
         return;
     }
-    const Vec3 off = frame.fit.pose.rotation.transpose() * (position_mm - frame.expected_mm[k]);
-    if (ticks == 0 || (off - state.astray_mm[k]).squaredNorm() > kSamePlaceMm * kSamePlaceMm) {
-        state.astray_mm[k] = off;
+    const Vec3 off_mm = frame.fit.pose.rotation.transpose() * (position_mm - frame.expected_mm[k]);
+    const Vec3 step_mm = off_mm - state.astray_mm[k];
+    if (ticks == 0 || step_mm.squaredNorm() > kSamePlaceMm * kSamePlaceMm) {
+        state.astray_mm[k] = off_mm;
+        state.astray_place_mm[k] = position_mm;
+        state.astray_steps_mm2[k] = 0.0;
         ticks = 1;
         return;
     }
-    state.astray_mm[k] += kAstrayLearning * (off - state.astray_mm[k]);
+    const Vec3 moved_mm = position_mm - state.astray_place_mm[k];
+    state.astray_steps_mm2[k] += moved_mm.squaredNorm() - step_mm.squaredNorm();
+    state.astray_mm[k] += kAstrayLearning * step_mm;
+    state.astray_place_mm[k] += kAstrayLearning * moved_mm;
     ticks = one_more(ticks);
-    if (ticks < ticks_of(config.astray_s, config.rate_hz)) return;
-    bias_mm[k] += frame.fit.pose.rotation * state.astray_mm[k];
+    if (!is_marker_astray(config, k, state)) return;
     ticks = 0;
+    const Vec3 bias = bias_mm[k] + frame.fit.pose.rotation * state.astray_mm[k];
+    if (off_its_place_mm(frame.fit.pose, neutral_offset_mm, bias, k) <= config.astray_mm) bias_mm[k] = bias;
+}
+
+void watch_unseen(const Topology& topology, const MarkerWatchConfig& config, const WatchedFrame& frame,
+                  std::span<const Vec3> neutral_offset_mm, std::size_t k, std::span<Vec3> bias_mm,
+                  MarkerWatchState& state) {
+    if (!should_be_seen(topology, config.facing_cosine, frame, k)) return;
+    state.absent_ticks[k] = one_more(state.absent_ticks[k]);
+    if (state.absent_ticks[k] >= ticks_of(config.fallen_s, config.rate_hz))
+        state.trouble[k] = MarkerTrouble::kFallen;
+    watch_astray(config, frame, neutral_offset_mm, k, bias_mm, state);
 }
 
 bool is_new_expression(const ShapeModel& model, const MarkerWatchConfig& config, const ShapeFit& fit,
@@ -108,13 +142,41 @@ bool is_new_expression(const ShapeModel& model, const MarkerWatchConfig& config,
 }
 
 // An expression for or against a seen marker that stands off.
-void count_off(double off_mm, const MarkerWatchConfig& config, std::size_t k, MarkerWatchState& state) {
+void count_off(bool stands_off, const MarkerWatchConfig& config, std::size_t k, MarkerWatchState& state) {
     std::uint8_t& count = state.off_count[k];
-    if (off_mm > config.slid_mm) {
+    if (stands_off) {
         if (count < config.slid_expressions) ++count;
         if (count == config.slid_expressions) state.trouble[k] = MarkerTrouble::kSlid;
     } else if (count > 0 && --count == 0 && state.trouble[k] == MarkerTrouble::kSlid) {
         state.trouble[k] = MarkerTrouble::kNone;
+    }
+}
+
+// Every seen marker, in an expression that counts. Those known to have slid do not hide others: the face does
+// not bend after them any more.
+void count_all_off(const ShapeModel& model, const MarkerWatchConfig& config, const WatchedFrame& frame,
+                   std::span<const Vec3> neutral_offset_mm, std::span<const Vec3> bias_mm,
+                   MarkerWatchState& state) {
+    std::array<double, kMaxMarkers> off_mm{};
+    std::size_t farthest = model.marker_count;
+    double most_mm = 0.0;
+    double next_mm = 0.0;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        if (!frame.named.markers[k].seen) continue;
+        off_mm[k] = off_its_place_mm(frame.fit.pose, neutral_offset_mm, bias_mm[k], k);
+        if (state.trouble[k] == MarkerTrouble::kSlid) continue;
+        if (off_mm[k] > most_mm) {
+            next_mm = most_mm;
+            most_mm = off_mm[k];
+            farthest = k;
+        } else {
+            next_mm = std::max(next_mm, off_mm[k]);
+        }
+    }
+    const bool stands_out = most_mm > config.slid_alone_mm && most_mm >= config.alone_ratio * next_mm;
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        if (!frame.named.markers[k].seen) continue;
+        count_off(off_mm[k] > config.slid_mm || (k == farthest && stands_out), config, k, state);
     }
 }
 
@@ -135,15 +197,14 @@ void watch_markers(const ShapeModel& model, const Topology& topology, const Mark
     const bool counts = is_new_expression(model, config, frame.fit, state);
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         if (!frame.named.markers[k].seen) {
-            watch_unseen(topology, config, frame, k, bias_mm, state);
+            watch_unseen(topology, config, frame, neutral_offset_mm, k, bias_mm, state);
             continue;
         }
         state.absent_ticks[k] = 0;
         state.astray_ticks[k] = 0;
         if (state.trouble[k] == MarkerTrouble::kFallen) state.trouble[k] = MarkerTrouble::kNone;
-        if (!counts) continue;
-        count_off(off_its_place_mm(frame.fit.pose, neutral_offset_mm, bias_mm[k], k), config, k, state);
     }
+    if (counts) count_all_off(model, config, frame, neutral_offset_mm, bias_mm, state);
 }
 
 }  // namespace rig

@@ -23,11 +23,18 @@ struct MarkerWatchConfig {
     double rate_hz = 60.0;
     double fallen_s = 5.0;   // unseen although it should be seen
     double astray_s = 1.0;   // a sighting without a name keeps its place beside an unseen marker
-    double astray_mm = 6.0;  // ... within this of it
-    // Off the face, which bends after a marker that slid: 3 mm show as 1.8 and more, but for the corners of
-    // the lips, which it follows almost whole (headrig experiment identity-troubles). Right ones stay within
-    // 0.05 on the public takes.
+    double astray_mm = 6.0;  // ... within this of it; nor is a marker ever taken to have moved farther
+    // Squared steps that show whether a sighting moves with the face or stands still under the helmet: by how
+    // much the ones must exceed the others. A face at rest shows neither; then it takes three times as long.
+    double astray_steps_mm2 = 10.0;
+    // Off the face, which bends after a marker that slid and takes others along: 3 mm show as 1.6 and more,
+    // and beside it as up to 1.0 (headrig experiment identity-troubles). Right ones stay within 0.05 on the
+    // public takes.
     double slid_mm = 1.2;
+    // The corners of the lips the face follows farther, 3 mm show as 1.05, but beside them as 0.66 at most.
+    // So less is enough of a marker that stands off by so much more than any other.
+    double slid_alone_mm = 0.8;
+    double alone_ratio = 1.4;
     std::uint8_t slid_expressions = 10;  // ... in so many expressions more than it was not
     double new_expression = 1.0;         // distance of the coefficients from the last one that counted
     double facing_cosine = 0.64;         // of a marker's normal with a camera that surely sees it: 50 degrees
@@ -37,8 +44,10 @@ struct MarkerWatchState {
     std::array<MarkerTrouble, kMaxMarkers> trouble{};
     std::array<std::uint16_t, kMaxMarkers> absent_ticks{};
     std::array<std::uint16_t, kMaxMarkers> astray_ticks{};
-    std::array<Vec3, kMaxMarkers> astray_mm{};          // from the expected place, face frame
-    std::array<std::uint8_t, kMaxMarkers> off_count{};  // expressions in which it stood off, less the others
+    std::array<Vec3, kMaxMarkers> astray_mm{};           // from the expected place, face frame
+    std::array<Vec3, kMaxMarkers> astray_place_mm{};     // headset frame
+    std::array<double, kMaxMarkers> astray_steps_mm2{};  // about that place less about the face's, squared
+    std::array<std::uint8_t, kMaxMarkers> off_count{};   // expressions in which it stood off, less the others
     std::array<double, kMaxModes> last_expression{};
 };
 

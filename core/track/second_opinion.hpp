@@ -25,6 +25,9 @@ struct SecondOpinionState {
 // Every opinion is asked for in the frames that follow.
 void ask_for_opinions(SecondOpinionState& state);
 
+// One was better: suspicion was right, and is listened to as at first.
+void take_opinion(SecondOpinionState& state);
+
 // Of one frame and its final names. `odd`: something else about the names is wrong. Suspicion that lasts asks
 // for opinions; when they change nothing, ever more time passes before the next.
 void suspect(const ShapeModel& model, std::span<const Vec3> predicted_mm, const SightingSet& sightings,
@@ -32,7 +35,10 @@ void suspect(const ShapeModel& model, std::span<const Vec3> predicted_mm, const 
 
 // One opinion (0..kOpinions - 1) on a frame's sightings and names, `fit` the face behind the names. True:
 // another naming leaves clearly less unexplained (naming_cost_mm2), by at least half a sighting; it is in
-// workspace.matches, its face in workspace.trial. Work is bounded: five coarse and seven whole fits.
+// workspace.matches, its face in workspace.trial. Failing that, each opinion looks at a few rivals: a marker
+// that none was found for, beside a sighting that only one view gives to another marker. A camera sees along
+// its ray no farther than the first of them, and the wrong one of both bends the face; so the rival has the
+// name when the face then fits clearly better. Work is bounded: five coarse and eleven whole fits.
 [[nodiscard]] bool second_opinion(const ShapeModel& model, const ShapeFit& fit, const SightingSet& sightings,
                                   const Matches& matches, std::uint8_t opinion, NamingWorkspace& workspace);
 

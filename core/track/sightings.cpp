@@ -33,6 +33,7 @@ void add_camera_view(const CameraModel& camera, std::span<const Observation> obs
     RIG_CHECK(set.view_count < kMaxCameras);
     const std::size_t view = set.view_count++;
     set.from_cameras = true;
+    set.cameras[view] = camera;
     set.row_delays = set.row_delays || camera.row_time_us > 0.0;
     const double sigma_mm = sigma_px * expected_depth_mm / (0.5 * (camera.fx_px + camera.fy_px));
     std::size_t next_left_out = 0;

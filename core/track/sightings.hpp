@@ -25,6 +25,7 @@ struct SightingSet {
     bool row_delays = false;      // a camera with a rolling shutter is among the views
     std::int64_t capture_us = 0;  // of the frame; only a rolling shutter asks for it
     std::array<ViewSightings, kMaxCameras> views{};
+    std::array<CameraModel, kMaxCameras> cameras{};  // behind each view, when from_cameras
     // Entry i of a view came from this index of the input (slots without a finite point are left out).
     std::array<BoundedVector<std::uint16_t, kMaxSightings>, kMaxCameras> source{};
 

@@ -1,6 +1,7 @@
 #include "core/track/tracker.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/base/check.hpp"
@@ -15,6 +16,8 @@ constexpr double kBiasLearning =
     0.02;  // per frame: follows a head the model does not quite fit within a second
 // Names need the face to a tenth of a millimetre; its fitted markers' own deviation is half of that.
 constexpr ShapeFitLimits kFitLimits{6, 0.3};
+constexpr int kReturnWindow = 3;  // frames in which one who came back a little off has to be seen once more
+constexpr int kMostReturnFrames = 31;
 
 std::span<const Vec3> predicted(const ShapeModel& model, const TrackerWorkspace& w) {
     return {w.predicted_mm.data(), model.marker_count};
@@ -48,20 +51,23 @@ void predict_face(const ShapeModel& model, const TrackerState& state, TrackerWor
 }
 
 // What a rolling shutter's rows are corrected by, over one round of naming: empty when there is none, or when
-// the last frame is too far away to tell a velocity (F34: outside [0.25, 4] frames).
+// the last frame is too far away to tell a velocity (F34: outside [0.25, 4] frames). `before_mm`
+// [marker_count]: the face in the last frame; empty: as state.fit has it.
 std::span<const Vec3> row_velocity(const ShapeModel& model, const TrackerConfig& config,
                                    const SightingSet& sightings, const TrackerState& state,
-                                   const ShapeFit* fitted, TrackerWorkspace& w) {
+                                   const ShapeFit* fitted, std::span<const Vec3> before_mm,
+                                   TrackerWorkspace& w) {
     if (!sightings.row_delays || !config.correct_rows) return {};
     const double frame_us = 1e6 / config.rate_hz;
     const auto since_us = static_cast<double>(elapsed_us(state.capture_us, sightings.capture_us));
     if (since_us < 0.25 * frame_us || since_us > 4.0 * frame_us) return {};
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         // The fitted face's step has less noise than a marker's own, and is a frame newer than the last one.
-        const Vec3 step =
-            fitted == nullptr
-                ? state.velocity_mm[k]
-                : Vec3{fitted->headset_position(model, k) - state.fit.headset_position(model, k)};
+        Vec3 step = state.velocity_mm[k];
+        if (fitted != nullptr) {
+            const Vec3 from_mm = before_mm.empty() ? state.fit.headset_position(model, k) : before_mm[k];
+            step = fitted->headset_position(model, k) - from_mm;
+        }
         w.velocity_mm_per_us[k] = step / since_us;
     }
     return {w.velocity_mm_per_us.data(), model.marker_count};
@@ -108,20 +114,27 @@ void withhold(std::size_t k, NamedMarkers& named, TrackerWorkspace& w) {
     for (auto& view : w.matches) view[k] = -1;
 }
 
-// Who comes back a little off waits a frame, who had come off the face half a second.
+// Who comes back a little off waits a frame, who had come off the face half a second. Frames in between that
+// do not show it in its place put off its return without beginning it anew: a marker may flicker.
 void hold_returns(const ShapeModel& model, const TrackerConfig& config, TrackerState& state,
                   NamedMarkers& named, TrackerWorkspace& w) {
     for (std::size_t k = 0; k < model.marker_count; ++k) {
-        std::uint8_t& waited = state.returning[k];
-        if (!named.markers[k].seen || state.missed[k] == 0) {
-            waited = 0;
+        std::uint64_t& frames = state.returning[k];
+        if (state.missed[k] == 0) {
+            frames = 0;
             continue;
         }
+        frames <<= 1U;
+        if (!named.markers[k].seen) continue;
         int needed = residual_of(w, state, named, k) > config.return_mm ? 1 : 0;
-        if (state.watch.trouble[k] == MarkerTrouble::kFallen) needed = config.fallen_return_frames;
-        if (waited >= needed) continue;
-        ++waited;
-        withhold(k, named, w);
+        int within = kReturnWindow;
+        if (state.watch.trouble[k] == MarkerTrouble::kFallen) {
+            needed = std::min<int>(config.fallen_return_frames, kMostReturnFrames);
+            within = 2 * needed;
+        }
+        const std::uint64_t recent = frames << static_cast<unsigned>(63 - within);
+        frames |= 1U;
+        if (std::popcount(recent) < needed) withhold(k, named, w);
     }
 }
 
@@ -218,16 +231,17 @@ void begin_tracking(const ShapeModel& model, const ShapeFit& fit, TrackerState& 
 
 // Names from motion, the face from the names, and names again from the face, which does not know who was who.
 void name_sightings(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings,
-                    TrackerState& state, TrackerWorkspace& w, NamedMarkers& named) {
+                    std::span<const Vec3> before_mm, TrackerState& state, TrackerWorkspace& w,
+                    NamedMarkers& named) {
     predict_motion(model, config, state, w);
-    std::span<const Vec3> velocity = row_velocity(model, config, sightings, state, nullptr, w);
+    std::span<const Vec3> velocity = row_velocity(model, config, sightings, state, nullptr, {}, w);
     match_views(predicted(model, w), sightings, config.first_gate_mm, w.matching, w.matches, velocity);
     w.first_matches = w.matches;
     combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
     fit_face(model, config, state, named, w);
 
     predict_face(model, state, w);
-    velocity = row_velocity(model, config, sightings, state, &w.next, w);
+    velocity = row_velocity(model, config, sightings, state, &w.next, before_mm, w);
     match_views(predicted(model, w), sightings, config.final_gate_mm, w.matching, w.matches, velocity);
     combine_views(predicted(model, w), sightings, config.gap_limit_mm, w.matches, named, velocity);
     // With the same names the fit stands: what the views say across their rays does not depend on what was
@@ -248,6 +262,11 @@ void hear_opinion(const ShapeModel& model, const TrackerConfig& config, const Si
         bool changed = false;
         for (std::size_t view = 0; view < sightings.view_count; ++view)
             changed = changed || other.matches[view][k] != w.matches[view][k];
+        // The face of before was bent to wrong names; where a marker with another name was, only the other
+        // face tells, as the helmet sat then.
+        w.before_mm[k] = changed || state.missed[k] > 0
+                             ? state.fit.pose.apply(model.face_position(k, other.trial.coefficients))
+                             : Vec3{state.position_mm[k] - state.bias_mm[k]};
         if (!changed) continue;
         state.missed[k] = std::max<std::uint16_t>(state.missed[k], 1);
         state.velocity_mm[k] = Vec3::Zero();
@@ -255,8 +274,9 @@ void hear_opinion(const ShapeModel& model, const TrackerConfig& config, const Si
         ++report.reconsidered;
     }
     report.swaps_repaired = static_cast<std::uint16_t>(report.swaps_repaired + report.reconsidered);
+    take_opinion(state.opinion);
     state.fit = other.trial;
-    name_sightings(model, config, sightings, state, w, named);
+    name_sightings(model, config, sightings, {w.before_mm.data(), model.marker_count}, state, w, named);
 }
 
 // Of neighbours that have changed places one name at least is wrong: both wait until the face says which.
@@ -271,11 +291,22 @@ void reject_broken_order(const ShapeModel& model, const TrackerState& state, Nam
     }
 }
 
+double least_seen(const ShapeModel& model, const TrackerConfig& config) {
+    return std::max(static_cast<double>(kMinMarkers), config.lost_share * model.marker_count);
+}
+
+// A frame in which hardly any marker is seen says nothing of the names.
+bool shows_a_face(const ShapeModel& model, const TrackerConfig& config, const NamedMarkers& named) {
+    std::size_t seen = 0;
+    for (std::size_t k = 0; k < model.marker_count; ++k) seen += named.markers[k].seen ? 1U : 0U;
+    return static_cast<double>(seen) >= least_seen(model, config);
+}
+
 void notice_loss(const ShapeModel& model, const TrackerConfig& config, TrackerState& state,
                  TrackerReport& report) {
-    const double needed = std::max(static_cast<double>(kMinMarkers), config.lost_share * model.marker_count);
-    state.poor_frames =
-        report.seen < needed ? static_cast<std::uint16_t>(state.poor_frames + 1) : std::uint16_t{0};
+    state.poor_frames = report.seen < least_seen(model, config)
+                            ? static_cast<std::uint16_t>(state.poor_frames + 1)
+                            : std::uint16_t{0};
     if (state.poor_frames >= config.lost_frames) reset_tracker(state);
     report.tracking = state.tracking;
 }
@@ -315,8 +346,8 @@ void track(const ShapeModel& model, const TrackerConfig& config, const SightingS
         ask_for_opinions(state.opinion);
         report.bootstrapped = true;
     }
-    name_sightings(model, config, sightings, state, w, named);
-    if (state.opinion.left > 0 && !report.bootstrapped) {
+    name_sightings(model, config, sightings, {}, state, w, named);
+    if (state.opinion.left > 0 && !report.bootstrapped && shows_a_face(model, config, named)) {
         hear_opinion(model, config, sightings, state, w, named, report);
     }
     reject_outliers(model, config, state, named, w, report);
@@ -327,7 +358,8 @@ void track(const ShapeModel& model, const TrackerConfig& config, const SightingS
     const double ratio = remember(model, named, w, state, report);
     find_left_over(model.marker_count, sightings, w.matches, w.left_over);
     const bool odd = report.rejected > 0 || ratio > config.suspicious_ratio;
-    suspect(model, predicted(model, w), sightings, w.matches, w.left_over, odd, state.opinion);
+    if (report.seen >= least_seen(model, config))
+        suspect(model, predicted(model, w), sightings, w.matches, w.left_over, odd, state.opinion);
     watch(model, config, sightings, named, state, w, report);
     state.capture_us = sightings.capture_us;
     report.matches = w.matches;

@@ -28,7 +28,8 @@ struct TrackerConfig {
     // Who comes back farther than this from the fitted face waits a frame for its name: a ghost rarely stays.
     // Right ones came back within 0.36 mm on the public streams, the one ghost that was taken within 1.97.
     double return_mm = 1.0;
-    std::uint8_t fallen_return_frames = 30;  // that a marker which had come off has to be seen for
+    // That a marker which had come off has to be seen in, of the last twice as many; at most 31.
+    std::uint8_t fallen_return_frames = 30;
     // Mean squared distance from the face, over the noise's, beyond which the names are suspected: 0.7 and at
     // most 1.1 with right ones on the public streams, 5 and more with a lip on the chin.
     double suspicious_ratio = 4.0;
@@ -58,7 +59,8 @@ struct TrackerState {
     Topology topology;  // of the model, from the start of tracking on
     SecondOpinionState opinion;
     MarkerWatchState watch;
-    std::array<std::uint8_t, kMaxMarkers> returning{};  // frames that a marker has been waiting for its name
+    // The last 64 frames of a marker that waits for its name, newest in bit 0: set when it was in its place.
+    std::array<std::uint64_t, kMaxMarkers> returning{};
 };
 
 struct TrackerWorkspace {
@@ -71,6 +73,7 @@ struct TrackerWorkspace {
     ShapeFit next;
     std::array<Vec3, kMaxMarkers> predicted_mm{};
     std::array<Vec3, kMaxMarkers> velocity_mm_per_us{};  // during this frame; used with a rolling shutter
+    std::array<Vec3, kMaxMarkers> before_mm{};  // in the last frame, when this one's names were reconsidered
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> informations{};
     std::array<bool, kMaxMarkers> broken{};  // order among neighbours

@@ -91,6 +91,26 @@ TEST_F(DetectAroundTest, CentresAreTheSameToTheBitOnCleanSkin) {
     EXPECT_EQ(around.size(), whole.size());
 }
 
+// A lamp goes out: contrasts are small in the same frame in which the light is.
+TEST_F(DetectAroundTest, TheFrameInWhichTheLightFallsIsJudgedByItsOwnLight) {
+    configure(MarkerPolarity::kDark);
+    const test::Scene scene = test::lattice_scene(10.0, 2.2, false, 3);
+    for (int frame = 0; frame < 3; ++frame) show(scene);
+    for (std::uint8_t& value : picture.pixels) value = static_cast<std::uint8_t>(value / 8 + 1);
+    look(expect(scene, 2.0F, 8.0F, 3));
+    EXPECT_FALSE(report.whole_image);
+    const double at_once = test::match(truth_of(scene), test::seen_dots(around)).recall();
+    look(expect(scene, 2.0F, 8.0F, 3));  // now the light was known before
+    const double known = test::match(truth_of(scene), test::seen_dots(around)).recall();
+    EXPECT_GE(known, 0.8);
+    EXPECT_GE(at_once, known - 0.01);
+    // What falls back to the whole image has measured its light once.
+    const double luma = report.mean_luma;
+    look({{100.0F, 100.0F, 8.0F, true}, {200.0F, 100.0F, 8.0F, true}});
+    EXPECT_TRUE(report.whole_image);
+    EXPECT_EQ(report.mean_luma, luma);
+}
+
 TEST_F(DetectAroundTest, OverlappingWindowsReportAMarkerOnce) {
     configure(MarkerPolarity::kDark);
     const test::Scene scene = test::lattice_scene(10.0, 1.5, false, 5);

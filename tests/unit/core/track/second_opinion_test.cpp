@@ -74,6 +74,52 @@ TEST(SecondOpinion, NamesThatMovedOnAreFound) {
     }
 }
 
+// One camera sees no depth: a marker that is hidden has the name of one whose ray passes by its place.
+TEST(SecondOpinion, ARivalOnTheSameRayGetsItsSightingBack) {
+    const test::SyntheticFace face({.camera_count = 1});
+    const auto model = test::shape_model_of(face.pack());
+    const CameraModel camera = face.pack().cameras[0];
+    const auto sightings = std::make_unique<SightingSet>();
+    const auto workspace = std::make_unique<NamingWorkspace>();
+    test::SeededRandom random(13);
+    int tried = 0;
+    int found = 0;
+    for (int frame = 0; frame < 60; ++frame) {
+        const std::vector<Vec3> truth =
+            test::moved(test::random_slip(random, 0.1, 10.0), face.positions(face.weights_at(0.7 * frame)));
+        const auto view = face.observe(0, truth, 0.1, 0.0, 0, random);
+        sightings->clear();
+        add_camera_view(camera, view.observations, 0.15, 210.0, *sightings);
+        Matches right;
+        for (auto& matches : right) matches.fill(-1);
+        for (std::size_t i = 0; i < view.marker.size(); ++i)
+            right[0][static_cast<std::size_t>(view.marker[i])] = static_cast<std::int16_t>(i);
+        for (std::size_t hidden = 0; hidden < 60; ++hidden) {
+            if (right[0][hidden] >= 0) continue;
+            for (std::size_t i = 0; i < view.marker.size(); ++i) {
+                const double apart_mm2 = sightings->views[0][i].squared_distance_mm2(truth[hidden]);
+                if (apart_mm2 < 1.8 * 1.8 || apart_mm2 > 4.0 * 4.0) continue;  // nearer, either may be it
+                ++tried;
+                Matches wrong = right;
+                std::swap(wrong[0][hidden], wrong[0][static_cast<std::size_t>(view.marker[i])]);
+                fit_to_names(*model, {0.2, 20.0}, ShapeFit{}, *sightings, wrong, *workspace);
+                ShapeFit fit = workspace->trial;
+                fit_to_names(*model, {0.03, 3.0}, fit, *sightings, wrong, *workspace);
+                fit = workspace->trial;
+                bool heard = false;
+                for (std::uint8_t opinion = 0; opinion < kOpinions && !heard; ++opinion)
+                    heard = second_opinion(*model, fit, *sightings, wrong, opinion, *workspace);
+                found += heard ? 1 : 0;
+                if (heard) {
+                    EXPECT_EQ(workspace->matches[0], right[0]) << hidden << " for " << view.marker[i];
+                }
+            }
+        }
+    }
+    EXPECT_GE(tried, 30);
+    EXPECT_EQ(found, tried);
+}
+
 TEST(SecondOpinion, WhatIsHiddenLeavesNothingToFind) {
     Scene s;
     std::vector<Vec3> points = s.truth;
@@ -121,6 +167,17 @@ TEST(SecondOpinion, SuspicionThatComesToNothingAsksEverLessOften) {
         state.left = 0;
     }
     EXPECT_GE(before, 900);
+}
+
+TEST(SecondOpinion, SuspicionThatWasRightIsHeardAsAtFirst) {
+    Scene s;
+    s.see(s.truth);
+    SecondOpinionState state;
+    for (int i = 0; i < 6; ++i) {
+        EXPECT_EQ(frames_until_asked(s, s.right, true, 2000, state), 8) << i;
+        take_opinion(state);
+        state.left = 0;
+    }
 }
 
 TEST(SecondOpinion, FarAwayIsNotBeside) {

@@ -298,6 +298,24 @@ TEST(Tracker, ShortLossKeepsTheNames) {
     EXPECT_EQ(names.missed, 0);
 }
 
+TEST(Tracker, DarkFramesSpendNoSecondOpinion) {
+    Scene s;
+    for (int frame = 0; frame < 6; ++frame)
+        s.track_cloud(shuffled_cloud(s.truth_at(frame / 60.0), 0.0, 0.0, s.random).points);
+    const std::uint8_t left = s.state->opinion.left;
+    ASSERT_GT(left, 2);
+    ASSERT_LT(left, kOpinions);
+    for (int frame = 6; frame < 8; ++frame) {
+        std::vector<Vec3> few = s.truth_at(frame / 60.0);
+        few.resize(frame == 6 ? 0 : 5);
+        s.track_cloud(few);
+    }
+    ASSERT_TRUE(s.report->tracking);
+    EXPECT_EQ(s.state->opinion.left, left);
+    s.track_cloud(s.truth_at(8 / 60.0));
+    EXPECT_EQ(s.state->opinion.left, left - 1);
+}
+
 class TrackerFromCameras : public testing::TestWithParam<std::size_t> {};
 
 TEST_P(TrackerFromCameras, NamesStayRightOverThreeHundredFrames) {
