@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 #include <tuple>
+#include <cstdlib>
 
 #include "core/base/math.hpp"
 #include "core/detect/blob_shape.hpp"
@@ -29,6 +30,7 @@ constexpr std::size_t kMostSecondLooks =
 constexpr double kDimmest = 0.4;  // of the least contrast, in a dim image
 constexpr double kTriedSizes = 1.5;       // long components are no one marker
 constexpr double kHopelessBadness = 1.5;  // score 0
+static double kLeastPart = getenv("LP")?atof(getenv("LP")):0.0;
 
 // Sixteen pixels of a row from x on; beyond the image, zeros.
 SixteenBytes pixels_at(const ImageView& image, int x, int y) {
@@ -272,9 +274,15 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
         connect(std::span<const Run>(w.runs).first(count), {least_area_px(config_.blob)},
                 {w.labels, w.label_of, w.grouped, w.components});
     result.report.blobs_full = counts.dropped > 0;
-    const bool follows = !(state_.usual_size_px > 0.0);
-    const Search search{image,   thresholds, side, largest,        state_.usual_size_px, state_.usual_depth,
-                        follows, 0,          0,    image.width_px, image.height_px};
+    const Search search{.image = image,
+                        .thresholds = thresholds,
+                        .side = side,
+                        .largest_px = largest,
+                        .usual_size_px = state_.usual_size_px,
+                        .usual_depth = state_.usual_depth,
+                        .first_look = !(state_.usual_size_px > 0.0),
+                        .right = image.width_px,
+                        .bottom = image.height_px};
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& component = w.components[c];
         const std::size_t before = result.blobs.size();
@@ -292,24 +300,24 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
 // marker. Now that the size of the image's markers is known, the background is taken at that scale.
 void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResult& result) {
     Workspace& w = workspace_;
-    if (w.failed.empty() && !wide.size_follows) return;
-    double usual = wide.usual_size_px;
-    double depth = wide.usual_depth;
-    if (wide.size_follows) {
+    if (w.failed.empty() && !wide.first_look) return;
+    Search search = wide;
+    search.first_look = false;
+    if (wide.first_look) {
         const Population population = population_of(result.blobs.span(), config_.population.quorum);
-        usual = population.size_px;
-        depth = population.depth;
+        search.usual_size_px = population.size_px;
+        search.usual_depth = population.depth;
+        search.largest_px = largest_marker(population.size_px);
     }
-    const double largest = largest_marker(usual);
-    const bool narrower = largest < wide.largest_px;
-    if (narrower) set_thresholds(means, wide.thresholds, wide.side, largest);
-    const Search search{wide.image, wide.thresholds, wide.side, largest,    usual,      depth,
-                        false,      wide.left,       wide.top,  wide.right, wide.bottom};
-    if (wide.size_follows) examine_pieces(search, result);
+    const double usual = search.usual_size_px;
+    search.least_part_px = static_cast<std::uint32_t>(kLeastPart * usual * usual);
+    const bool narrower = search.largest_px < wide.largest_px;
+    if (narrower) set_thresholds(means, wide.thresholds, wide.side, search.largest_px);
+    if (wide.first_look) examine_pieces(search, result);
     for (const std::uint16_t c : w.failed) {
         const Component& component = w.components[c];
         const std::span<const Run> runs = members_of(component, w.grouped);
-        if (wide.size_follows && examine(search, component, runs, {}, result)) continue;
+        if (wide.first_look && examine(search, component, runs, {}, result)) continue;
         // What a marker may be a part of was tried as a whole; then its own parts are not.
         Search inner = search;
         if (length_of(component) < kTriedSizes * usual) inner.usual_size_px = 0.0;
@@ -373,7 +381,7 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         return blob.rejection == Rejection::kSmall || (blob.rejection == Rejection::kFaint && !sparse);
     }
     // Another look once the size of the image's markers is known.
-    if (search.size_follows && blob.badness > kSureBadness) return false;
+    if (search.first_look && blob.badness > kSureBadness) return false;
     if (!result.blobs.push_back(blob)) result.report.blobs_full = true;
     return true;
 }
@@ -381,6 +389,7 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
 // Level 0 cuts at the local background, deeper levels at a part of the component's own range of grey.
 void Detector::split(const Search& search, std::size_t level, const Component& component,
                      std::span<const Run> runs, SideResult& result) {
+    if (component.area_px < search.least_part_px) return;
     Workspace& w = workspace_;
     SplitStorage& storage = w.split[level];
     bool truncated = false;
@@ -397,6 +406,7 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
     const bool whole = counts.components == 1 && storage.components[0].area_px == component.area_px;
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& part = storage.components[c];
+        if (part.area_px < search.least_part_px) continue;
         const std::span<const Run> members = members_of(part, storage.grouped);
         if (search.cuts_off(part)) continue;  // another window sees all of it, or nobody does
         if (!whole && examine(search, part, members, all, result)) continue;

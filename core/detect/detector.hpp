@@ -104,15 +104,16 @@ class Detector {
     struct Search {
         const ImageView& image;
         const BlockGrid& thresholds;
-        Side side;
-        double largest_px;     // longest marker
-        double usual_size_px;  // long axis of the image's markers; 0: unknown,
-        double usual_depth;    // of their depths; 0: unknown
-        bool size_follows;     // for now
-        int left;              // px: what is looked at, and where the thresholds' grid begins
-        int top;
-        int right;  // exclusive
-        int bottom;
+        Side side = Side::kBelow;
+        double largest_px = 0.0;            // longest marker
+        double usual_size_px = 0.0;         // long axis of the image's markers; 0: unknown,
+        double usual_depth = 0.0;           // of their depths; 0: unknown
+        bool first_look = false;            // the markers' size is not known yet: odd blobs get another look
+        std::uint32_t least_part_px = 0;    // area of a part of a component that is worth measuring
+        int left = 0;                       // px: what is looked at, and where the thresholds' grid begins
+        int top = 0;
+        int right = 0;  // exclusive
+        int bottom = 0;
 
         [[nodiscard]] int level(int x, int y) const {
             return thresholds

@@ -31,6 +31,12 @@ using EightSums = std::uint16_t __attribute__((vector_size(16)));
     return FourFloats{} + value;
 }
 
+[[nodiscard]] inline FourFloats load_floats(const float* from) {
+    FourFloats four;
+    std::memcpy(&four, from, sizeof(four));
+    return four;
+}
+
 // `first`, `first` + 1, ... in the eight lanes.
 [[nodiscard]] inline PixelLanes counting_lanes(int first) {
     return PixelLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<std::int16_t>(first);
