@@ -31,8 +31,10 @@ constexpr int kMinRing = 12;          // pixels that can carry a plane
 constexpr double kPartBadness = 0.5;  // of a marker none of whose rim is seen
 constexpr double kLeastSize = 0.7;    // of a completed marker, in usual ones
 constexpr double kMostSize = 1.35;
-constexpr double kPieceReach = 1.1;  // of it, from a piece's middle
-constexpr int kRounds = 2;           // outline -> background -> outline
+constexpr double kMostFollowedOpen = 0.15;  // of a blob whose outline is followed
+constexpr double kLineAspect = 3.5;         // of what is longer than a marker
+constexpr double kPieceReach = 1.1;         // of it, from a piece's middle
+constexpr int kRounds = 2;                  // outline -> background -> outline
 
 // Grey level at column x, row y of the window: level + slope_x (x - centre_x) + slope_y (y - centre_y).
 struct Plane {
@@ -410,9 +412,15 @@ void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, c
     judge_shape(fit.rms, limits, blob);
 }
 
-bool has_odd_outline(const Blob& blob) {
-    return blob.rejection == Rejection::kIrregular ||
-           (blob.rejection == Rejection::kNone && blob.badness > kSureBadness);
+// Where a fit of its outline may make a marker of a blob: it is not the middle of something larger, and no
+// line.
+bool has_odd_outline(const BlobLimits& limits, const Blob& blob) {
+    const bool closed = blob.open < kMostFollowedOpen;
+    const bool line = blob.long_axis_px > kLineAspect * blob.short_axis_px &&
+                      blob.long_axis_px > kMostSize * limits.usual_size_px;
+    return closed && !line &&
+           (blob.rejection == Rejection::kIrregular ||
+            (blob.rejection == Rejection::kNone && blob.badness > kSureBadness));
 }
 
 bool is_piece(const BlobLimits& limits, const Blob& blob) {
@@ -498,7 +506,7 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
         } else if (is_piece(limits, blob)) {
             join_pieces(image, side, fit, limits, blob.x_px - w.left, blob.y_px - w.top, w, blob);
         }
-        if (!several && !blob.completed && has_odd_outline(blob)) {
+        if (!several && !blob.completed && has_odd_outline(limits, blob)) {
             compute_cover(w, side, fit.plane, blob.contrast, kRedrawReach + kMoatReach);
             const BitRows own = w.blob;
             const BitBox own_box = w.box;

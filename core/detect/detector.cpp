@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <span>
 #include <tuple>
-#include <cstdlib>
 
 #include "core/base/math.hpp"
 #include "core/detect/blob_shape.hpp"
@@ -30,7 +29,8 @@ constexpr std::size_t kMostSecondLooks =
 constexpr double kDimmest = 0.4;  // of the least contrast, in a dim image
 constexpr double kTriedSizes = 1.5;       // long components are no one marker
 constexpr double kHopelessBadness = 1.5;  // score 0
-static double kLeastPart = getenv("LP")?atof(getenv("LP")):0.0;
+constexpr double kLittlePart = 0.2;   // of a usual size's square: a quarter of a marker seen from the front
+constexpr std::size_t kFewParts = 2;  // of a component
 
 // Sixteen pixels of a row from x on; beyond the image, zeros.
 SixteenBytes pixels_at(const ImageView& image, int x, int y) {
@@ -148,6 +148,10 @@ bool stands_alone(const Component& component, const Siblings& siblings) {
         if (!apart && !itself && other.area_px * kPeerAreas >= component.area_px) return false;
     }
     return true;
+}
+
+bool is_apart(const Component& component, std::span<const Run> runs, const Siblings& siblings) {
+    return stands_alone(component, siblings) && holds_its_middle(component, runs);
 }
 
 }  // namespace
@@ -310,7 +314,7 @@ void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResu
         search.largest_px = largest_marker(population.size_px);
     }
     const double usual = search.usual_size_px;
-    search.least_part_px = static_cast<std::uint32_t>(kLeastPart * usual * usual);
+    search.little_area_px = static_cast<std::uint32_t>(kLittlePart * usual * usual);
     const bool narrower = search.largest_px < wide.largest_px;
     if (narrower) set_thresholds(means, wide.thresholds, wide.side, search.largest_px);
     if (wide.first_look) examine_pieces(search, result);
@@ -364,8 +368,7 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
     limits.min_contrast = least_contrast(search.side);
     Blob blob;
     QuickStart start;
-    const bool alone = stands_alone(component, siblings) && holds_its_middle(component, runs) &&
-                       frame_component(search.image, component, start);
+    const bool alone = is_apart(component, runs, siblings) && frame_component(search.image, component, start);
     const bool quick =
         alone && measure_quickly(search.image, search.side, start, limits, workspace_.quick, blob);
     if (!quick || blob.long_axis_px < kPieceSize * limits.usual_size_px) {
@@ -389,7 +392,6 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
 // Level 0 cuts at the local background, deeper levels at a part of the component's own range of grey.
 void Detector::split(const Search& search, std::size_t level, const Component& component,
                      std::span<const Run> runs, SideResult& result) {
-    if (component.area_px < search.least_part_px) return;
     Workspace& w = workspace_;
     SplitStorage& storage = w.split[level];
     bool truncated = false;
@@ -406,9 +408,11 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
     const bool whole = counts.components == 1 && storage.components[0].area_px == component.area_px;
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& part = storage.components[c];
-        if (part.area_px < search.least_part_px) continue;
         const std::span<const Run> members = members_of(part, storage.grouped);
         if (search.cuts_off(part)) continue;  // another window sees all of it, or nobody does
+        // Little of something larger is a marker's core only where it is clear of the rest.
+        const bool little = part.area_px < search.little_area_px;
+        if (little && (counts.components > kFewParts || !is_apart(part, members, all))) continue;
         if (!whole && examine(search, part, members, all, result)) continue;
         if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
     }
