@@ -227,7 +227,7 @@ double followed_part(const Points& points, float reach, const Conic& conic, cons
         const FourFloats u_size = greater_of(u, -u), v_size = greater_of(v, -v);
         const auto steep = greater_of(u_size, v_size) * kEighth < less_of(u_size, v_size);
         const auto sector =
-            (u < FourFloats{} & 8) + (v < FourFloats{} & 4) + (u_size < v_size & 2) + (steep & 1);
+            ((u < FourFloats{}) & 8) + ((v < FourFloats{}) & 4) + ((u_size < v_size) & 2) + (steep & 1);
         for (std::size_t k = 0; k < 4 && i + k < points.count; ++k) {
             if (off[k] == 0) sectors |= 1U << sector[k];
         }
