@@ -515,7 +515,7 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
         }
     }
     Rejection reason = Rejection::kNone;
-    if (!blob.completed && looks_shadowed(blob.rejection) && redraw_blob(w, kDeep, reason)) {
+    if (!blob.completed && looks_shadowed(blob) && redraw_blob(w, kDeep, reason)) {
         measure_outline(image, fit, kDeep, limits, w, blob);
         blob.badness += kDeepBadness;
     }

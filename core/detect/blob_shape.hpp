@@ -41,7 +41,7 @@ inline constexpr double kDeepBadness = 0.25;  // of a marker that only shows at 
 // Worth completing: of the paint of the image's markers, and not so long that no marker is in it.
 [[nodiscard]] bool may_be_completed(Side side, const BlobLimits& limits, const Blob& blob);
 
-// Refused for what shadow does to an outline: worth another look at the deep one.
-[[nodiscard]] bool looks_shadowed(Rejection rejection);
+// Refused for what shadow does to an outline, and not by much: worth another look at the deep one.
+[[nodiscard]] bool looks_shadowed(const Blob& blob);
 
 }  // namespace rig
