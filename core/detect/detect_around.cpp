@@ -222,6 +222,7 @@ bool Detector::search_windows(const ImageView& image, Side side, std::span<const
     result.report = DetectorReport{};
     result.second_looks = 0;
     workspace_.examined.clear();
+    set_core_steps(side);
     for (const ExpectedMarker& marker : expected) {
         if (is_usable(marker) && !search_window(image, side, marker, result)) return false;
     }

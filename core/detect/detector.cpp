@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "core/base/math.hpp"
+#include "core/base/ranked.hpp"
 #include "core/detect/blob_shape.hpp"
 #include "core/detect/components.hpp"
 #include "core/detect/edge_slope.hpp"
@@ -41,6 +42,16 @@ SixteenBytes pixels_at(const ImageView& image, int x, int y) {
     return load_bytes(rest.data());
 }
 
+// 0xFF in the bytes from `count` on.
+SixteenBytes beyond_first(int count) {
+    static constexpr std::array<std::uint8_t, 2UL * kByteLanes> kEdge = [] {
+        std::array<std::uint8_t, 2UL * kByteLanes> edge{};
+        std::fill(edge.begin() + kByteLanes, edge.end(), std::uint8_t{0xFF});
+        return edge;
+    }();
+    return load_bytes(&kEdge[static_cast<std::size_t>(kByteLanes - count)]);
+}
+
 // The parts of `runs` whose pixels are marked, as runs; marked(x, y, count): one bit for each of up to
 // sixteen pixels from x on, bits beyond them mean nothing.
 template <class Marked>
@@ -71,13 +82,6 @@ std::size_t cut(std::span<const Run> runs, std::span<Run> out, bool& truncated, 
     return count;
 }
 
-// The value that `rank` others are no greater than; reorders them.
-double ranked(std::span<float> values, std::size_t rank) {
-    const auto place = values.begin() + static_cast<std::ptrdiff_t>(rank);
-    std::nth_element(values.begin(), place, values.end());
-    return static_cast<double>(*place);
-}
-
 bool in_range(double value, double low, double high) {
     return value >= low && value <= high;  // false for NaN
 }
@@ -103,7 +107,7 @@ std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span
     SixteenBytes least = most + 255;
     for (const Run& run : runs) {
         for (int x = run.begin; x < run.end; x += kByteLanes) {
-            const SixteenBytes outside = ~bytes_of_bits(row_mask(std::min(kByteLanes, run.end - x)));
+            const SixteenBytes outside = beyond_first(std::min(kByteLanes, run.end - x));
             const SixteenBytes v = pixels_at(search.image, x, run.y) ^ turn;
             most = most > (v & ~outside) ? most : (v & ~outside);
             least = least < (v | outside) ? least : (v | outside);
@@ -238,25 +242,30 @@ void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& threshold
 }
 
 // Texture and noise just reach the threshold; a marker whose mid contrast does has pixels well beyond it.
-bool Detector::has_core(const Search& search, std::span<const Run> runs) const {
-    const int least = static_cast<int>(least_contrast(search.side));
+void Detector::set_core_steps(Side side) {
+    const int least = static_cast<int>(least_contrast(side));
     const int part = static_cast<int>(config_.relative_contrast * 256.0);
-    const int whole = search.side == Side::kBelow ? 256 - part : 256 + part;
+    const int whole = side == Side::kBelow ? 256 - part : 256 + part;
+    for (int level = 0; level < 256; ++level) {  // twice the difference is a step or more
+        workspace_.core_steps[static_cast<std::size_t>(level)] =
+            static_cast<std::uint16_t>((std::max(least, level * part / whole) + 1) / 2);
+    }
+}
+
+// From the middle on, where a marker is deepest.
+bool Detector::has_core(const Search& search, std::span<const Run> runs) const {
     const int sign = search.side == Side::kBelow ? 1 : -1;
     int deep = 0;
-    int known = -1;  // the level that `most` is for
-    int most = 0;
-    for (const Run& run : runs) {
+    const std::size_t middle = runs.size() / 2;
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+        const Run& run = runs[i + middle < runs.size() ? i + middle : i + middle - runs.size()];
         const std::uint8_t* pixels = search.image.row(run.y);
         for (int x = run.begin; x < run.end;) {
             const int level = search.level(x, run.y);
-            if (level != known) {  // twice the difference is a step or more
-                most = (std::max(least, level * part / whole) + 1) / 2;
-                known = level;
-            }
+            const int step = workspace_.core_steps[static_cast<std::size_t>(level)];
             const int end = std::min<int>(run.end, x + kBlock - (x - search.left) % kBlock);
             for (; x < end; ++x) {
-                if (sign * (level - pixels[x]) >= most && ++deep == kCorePixels) return true;
+                if (sign * (level - pixels[x]) >= step && ++deep == kCorePixels) return true;
             }
         }
     }
@@ -272,6 +281,7 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
     const double largest = largest_marker(state_.usual_size_px);
     set_thresholds(means, thresholds, side, largest);
+    set_core_steps(side);
     const std::size_t count = threshold_runs(image, thresholds, side, w.runs, result.report.runs_full);
     result.report.runs = static_cast<std::uint32_t>(count);
     const ComponentCounts counts =

@@ -168,6 +168,7 @@ class Detector {
         std::array<std::uint8_t, kMaxBlocks> means{};
         std::array<std::uint8_t, kMaxBlocks> background{};
         std::array<std::uint8_t, kSlideBytes> slide{};
+        std::array<std::uint16_t, 256> core_steps{};  // by threshold: how far beyond it a core is
         std::array<Run, kMaxRuns> runs{};
         std::array<ComponentLabel, kMaxRuns> labels{};
         std::array<std::uint16_t, kMaxRuns> label_of{};
@@ -209,6 +210,7 @@ class Detector {
                SideResult& result);
     [[nodiscard]] bool examine(const Search& search, const Component& component, std::span<const Run> runs,
                                const Siblings& siblings, SideResult& result);
+    void set_core_steps(Side side);
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
     void apply_population(const ImageView& image, Side side, SideResult& result) const;
     [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);

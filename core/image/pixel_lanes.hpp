@@ -207,6 +207,16 @@ struct EightInts {
 #endif
 }
 
+// Correctly rounded, as scalar roots are.
+[[nodiscard]] inline FourFloats roots_of(FourFloats v) {
+#if defined(__SSE2__)
+    return __builtin_ia32_sqrtps(v);
+#else
+    return FourFloats{__builtin_sqrtf(v[0]), __builtin_sqrtf(v[1]), __builtin_sqrtf(v[2]),
+                      __builtin_sqrtf(v[3])};
+#endif
+}
+
 // Whole numbers within 16 bits, as lanes.
 [[nodiscard]] inline PixelLanes lanes_of_ints(const EightInts& v) {
 #if defined(__SSE2__)
