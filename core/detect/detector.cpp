@@ -30,8 +30,9 @@ constexpr std::size_t kMostSecondLooks =
 constexpr double kDimmest = 0.4;  // of the least contrast, in a dim image
 constexpr double kTriedSizes = 1.5;       // long components are no one marker
 constexpr double kHopelessBadness = 1.5;  // score 0
-constexpr double kLittlePart = 0.2;   // of a usual size's square: a quarter of a marker seen from the front
-constexpr std::size_t kFewParts = 2;  // of a component
+constexpr double kLittlePart =
+    0.3;  // of a usual size's square, some 0.4 of a marker seen from the front; and one
+constexpr std::size_t kFewParts = 2;  // among more parts than these is texture, not a core
 
 // Sixteen pixels of a row from x on; beyond the image, zeros.
 SixteenBytes pixels_at(const ImageView& image, int x, int y) {
@@ -420,9 +421,9 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
         const Component& part = storage.components[c];
         const std::span<const Run> members = members_of(part, storage.grouped);
         if (search.cuts_off(part)) continue;  // another window sees all of it, or nobody does
-        // Little of something larger is a marker's core only where it is clear of the rest.
+        // One little part among several of something larger is texture, unless it is clear of the others.
         const bool little = part.area_px < search.little_area_px;
-        if (little && (counts.components > kFewParts || !is_apart(part, members, all))) continue;
+        if (little && counts.components > kFewParts && !is_apart(part, members, all)) continue;
         if (!whole && examine(search, part, members, all, result)) continue;
         if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
     }

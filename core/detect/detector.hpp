@@ -105,13 +105,12 @@ class Detector {
         const ImageView& image;
         const BlockGrid& thresholds;
         Side side = Side::kBelow;
-        double largest_px = 0.0;     // longest marker
-        double usual_size_px = 0.0;  // long axis of the image's markers; 0: unknown,
-        double usual_depth = 0.0;    // of their depths; 0: unknown
-        bool first_look = false;     // the markers' size is not known yet: odd blobs get another look
-        std::uint32_t little_area_px =
-            0;         // of a part of a component, below which it must stand clear of the others
-        int left = 0;  // px: what is looked at, and where the thresholds' grid begins
+        double largest_px = 0.0;           // longest marker
+        double usual_size_px = 0.0;        // long axis of the image's markers; 0: unknown,
+        double usual_depth = 0.0;          // of their depths; 0: unknown
+        bool first_look = false;           // the markers' size is not known yet: odd blobs get another look
+        std::uint32_t little_area_px = 0;  // of a part among several, below which it must stand clear
+        int left = 0;                      // px: what is looked at, and where the thresholds' grid begins
         int top = 0;
         int right = 0;  // exclusive
         int bottom = 0;

@@ -19,7 +19,6 @@ struct Point {
 constexpr std::size_t kMaxPoints = 256;
 constexpr std::size_t kMinPoints = 10;
 constexpr std::size_t kUnknowns = 5;
-constexpr double kPivotFloor = 1e-9;             // of the largest: sums of single precision know no less
 constexpr float kFollows = 0.45F;                // px between the ellipse and what follows it
 constexpr float kMayFollow = 1.2F;               // px, of what may follow it after the rounds to come
 constexpr std::array kFirstReaches{1.2F, 0.8F};  // px, of rounds after the one of equal weights
@@ -130,7 +129,7 @@ bool solve(const PowerSums& s, Conic& conic) {
                                    row(xxyy, sum_of_four(s.xyyy), sum_of_four(s.yyyy), 0.0, 0.0),
                                    row(sum_of_four(s.xxx), xxy, xyy, right[0], 0.0),
                                    row(xxy, xyy, sum_of_four(s.yyy), right[1], right[2])};
-    if (!cholesky(m[0].data(), m[0].data(), kUnknowns, kUnknowns, kPivotFloor)) return false;
+    if (!cholesky(m[0].data(), m[0].data(), kUnknowns, kUnknowns)) return false;
     conic = right;
     solve_lower(m[0].data(), kUnknowns, kUnknowns, conic.data());
     solve_lower_transposed(m[0].data(), kUnknowns, kUnknowns, conic.data());
@@ -320,14 +319,14 @@ bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
         const Point left_out = start > 0 ? kDirections[start - 1] : Point{};
         Conic conic{};
         Ellipse fitted;
-        if (!fit_first(points, left_out, conic) || !fit_in_rounds(points, kFirstReaches, conic) ||
-            !ellipse_of(conic, origin, fitted))
-            continue;
-        const auto before = std::span(tried).first(tries);
-        if (std::any_of(before.begin(), before.end(), [&](const Ellipse& e) { return are_one(e, fitted); }))
-            continue;
-        tried[tries++] = fitted;
-        if (followed_part(points, kMayFollow, conic, origin, fitted) < kLeastFollowed) continue;
+        if (!fit_first(points, left_out, conic) || !fit_in_rounds(points, kFirstReaches, conic)) continue;
+        if (ellipse_of(conic, origin, fitted)) {  // if it is none yet, it may become one
+            const auto before = std::span(tried).first(tries);
+            const auto same = [&](const Ellipse& e) { return are_one(e, fitted); };
+            if (std::any_of(before.begin(), before.end(), same)) continue;
+            tried[tries++] = fitted;
+            if (followed_part(points, kMayFollow, conic, origin, fitted) < kLeastFollowed) continue;
+        }
         if (!fit_in_rounds(points, kLastReaches, conic) || !ellipse_of(conic, origin, fitted)) continue;
         fitted.followed = followed_part(points, kFollows, conic, origin, fitted);
         if (fitted.followed <= best) continue;
