@@ -148,22 +148,16 @@ SixteenBytes extremes(const BlockRow& of, std::size_t x) {
     return extreme;
 }
 
-// One word from pixel `first` on, of kRows at once, so that their levels are spread once; most have no pixel
-// beyond.
+// One word from pixel `first` on, of kRows at once, so that their levels are spread once; most vectors have
+// no pixel beyond.
 template <Side kSide, std::size_t kRows>
 void mark_word(const BlockRow& of, std::size_t first, RowWords* words) {
-    std::uint64_t all = 0xFFFF;
+    std::uint64_t bits[kRows]{};
     for (std::size_t x = 0; x < kWordPx; x += kLanes) {
         const SixteenBytes levels = load_four_times_each(of.levels + (first + x) / kBlockPx);
-        all &= within<kSide>(extremes<kSide, kRows>(of, first + x), levels);
-    }
-    std::uint64_t bits[kRows]{};
-    if (all != 0xFFFF) {
-        for (std::size_t x = 0; x < kWordPx; x += kLanes) {
-            const SixteenBytes levels = load_four_times_each(of.levels + (first + x) / kBlockPx);
-            for (std::size_t r = 0; r < kRows; ++r)
-                bits[r] |= (within<kSide>(load_bytes(of.pixels[r] + first + x), levels) ^ 0xFFFF) << x;
-        }
+        if (within<kSide>(extremes<kSide, kRows>(of, first + x), levels) == 0xFFFF) continue;
+        for (std::size_t r = 0; r < kRows; ++r)
+            bits[r] |= (within<kSide>(load_bytes(of.pixels[r] + first + x), levels) ^ 0xFFFF) << x;
     }
     for (std::size_t r = 0; r < kRows; ++r) words[r][first / kWordPx] = bits[r];
 }
