@@ -234,26 +234,19 @@ double followed_part(const Points& points, float reach, const Conic& conic, cons
     return static_cast<double>(ones(sectors)) / kSectors;
 }
 
-// Pixels of row y within the ellipse grown by `by` px, as a span of bits.
-std::uint64_t span_of(const Ellipse& e, int y, double by) {
+// The ellipse grown by `by` px.
+EllipseRows rows_of(const Ellipse& e, double by) {
     const double mean = sqrt(sqrt(std::max(1e-9, e.xx * e.yy - e.xy * e.xy)));  // half the mean radius
-    const double grown = std::max(0.0, 2.0 + by / mean);
-    const double dy = y - e.y;
-    const double root = grown * grown - dy * dy / e.yy;
-    if (!(root > 0.0)) return 0;
-    const double half = sqrt(root * std::max(0.0, e.xx - e.xy * e.xy / e.yy));
-    const double middle = e.x + e.xy / e.yy * dy;
-    const auto begin = static_cast<int>(std::clamp(middle - half, 0.0, 63.0) + 0.999999);
-    const auto end = static_cast<int>(std::clamp(middle + half, -1.0, 63.0) + 1.0);
-    return begin < end ? bit_span(begin, end) : 0;
+    return {e.x, e.y, e.xx, e.xy, e.yy, std::max(0.0, 2.0 + by / mean)};
 }
 
 // Of the ellipse, the part that is paint.
 double filled_part(const Ellipse& ellipse, const BlobWorkspace& w) {
+    const EllipseRows rows = rows_of(ellipse, -kInside);
     int all = 0;
     int paint = 0;
     for (int y = 0; y < w.height; ++y) {
-        const std::uint64_t inner = span_of(ellipse, y, -kInside) & row_mask(w.width);
+        const std::uint64_t inner = rows.at(y) & row_mask(w.width);
         all += ones(inner);
         paint += ones(inner & w.blob[static_cast<std::size_t>(y)]);
     }
@@ -269,10 +262,11 @@ bool are_one(const Ellipse& a, const Ellipse& b) {
 }  // namespace
 
 void mark_disc(double x, double y, double radius, const BlobWorkspace& w, BitRows& disc) {
-    const Ellipse circle{x, y, 0.25 * radius * radius, 0.0, 0.25 * radius * radius};
+    const double square = std::max(1e-9, 0.25 * radius * radius);
+    const EllipseRows rows(x, y, square, 0.0, square, 2.0);
     disc.fill(0);
     for (int row = 0; row < w.height; ++row) {
-        disc[static_cast<std::size_t>(row)] = span_of(circle, row, 0.0) & row_mask(w.width);
+        disc[static_cast<std::size_t>(row)] = rows.at(row) & row_mask(w.width);
     }
 }
 
@@ -339,13 +333,15 @@ bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
 }
 
 bool keep_ellipse(const Ellipse& ellipse, BlobWorkspace& w) {
+    const EllipseRows inner_rows = rows_of(ellipse, -kInside);
+    const EllipseRows outer_rows = rows_of(ellipse, kOutside);
     int all = 0;
     int paint = 0;
     for (int y = 0; y < w.height; ++y) {
         const auto row = static_cast<std::size_t>(y);
         const std::uint64_t mask = row_mask(w.width);
-        const std::uint64_t inner = span_of(ellipse, y, -kInside) & mask;
-        const std::uint64_t outer = span_of(ellipse, y, kOutside) & mask;
+        const std::uint64_t inner = inner_rows.at(y) & mask;
+        const std::uint64_t outer = outer_rows.at(y) & mask;
         w.hidden[row] |= (inner & ~w.blob[row]) | (w.blob[row] & ~outer);
         all += ones(inner);
         paint += ones(inner & w.blob[row]);
