@@ -31,8 +31,10 @@ constexpr int kMinRing = 12;          // pixels that can carry a plane
 constexpr double kPartBadness = 0.5;  // of a marker none of whose rim is seen
 constexpr double kLeastSize = 0.7;    // of a completed marker, in usual ones
 constexpr double kMostSize = 1.35;
-constexpr double kPieceReach = 1.1;  // of it, from a piece's middle
-constexpr int kRounds = 2;           // outline -> background -> outline
+constexpr double kMostFollowedOpen = 0.15;  // of a blob whose outline is followed
+constexpr double kLineAspect = 3.5;         // of what is longer than a marker
+constexpr double kPieceReach = 1.1;         // of it, from a piece's middle
+constexpr int kRounds = 2;                  // outline -> background -> outline
 
 // Grey level at column x, row y of the window: level + slope_x (x - centre_x) + slope_y (y - centre_y).
 struct Plane {
@@ -323,25 +325,12 @@ SoftMoments soft_moments(BlobWorkspace& w, int outline) {
 double outline_deviation_px(const BlobWorkspace& w, const SoftMoments& m, double mean_radius_px) {
     const double determinant = m.xx * m.yy - m.xy * m.xy;
     if (determinant <= 0.0) return kBlobWindowPx;
-    // Row by row the ellipse a dx^2 + b dx dy + c dy^2 <= 4 is one span.
     const BitBox box = widened(w.box, 2, w.width, w.height);
-    const double a = m.yy / determinant;
-    const double b = -2.0 * m.xy / determinant;
-    const double c = m.xx / determinant;
+    const EllipseRows ellipse(m.x, m.y, m.xx, m.xy, m.yy, 2.0);
     int wrong = 0;
     for (int y = box.top; y < box.bottom; ++y) {
-        const double dy = y - m.y;
-        const double root = b * b * dy * dy - 4.0 * a * (c * dy * dy - 4.0);
-        std::uint64_t ellipse = 0;
-        if (root >= 0.0) {
-            const double middle = m.x - 0.5 * b * dy / a;
-            const double half = 0.5 * sqrt(root) / a;
-            const auto begin = static_cast<int>(std::clamp(middle - half, 0.0, 63.0) + 0.999999);
-            const auto end = static_cast<int>(std::clamp(middle + half, -1.0, 63.0) + 1.0);
-            if (begin < end) ellipse = bit_span(begin, end);
-        }
-        wrong +=
-            ones((ellipse ^ w.blob[static_cast<std::size_t>(y)]) & ~w.hidden[static_cast<std::size_t>(y)]);
+        const auto row = static_cast<std::size_t>(y);
+        wrong += ones((ellipse.at(y) ^ w.blob[row]) & ~w.hidden[row]);
     }
     return wrong / (6.283185307179586 * mean_radius_px);
 }
@@ -410,9 +399,15 @@ void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, c
     judge_shape(fit.rms, limits, blob);
 }
 
-bool has_odd_outline(const Blob& blob) {
-    return blob.rejection == Rejection::kIrregular ||
-           (blob.rejection == Rejection::kNone && blob.badness > kSureBadness);
+// Where a fit of its outline may make a marker of a blob: it is not the middle of something larger, and no
+// line.
+bool has_odd_outline(const BlobLimits& limits, const Blob& blob) {
+    const bool closed = blob.open < kMostFollowedOpen;
+    const bool line = blob.long_axis_px > kLineAspect * blob.short_axis_px &&
+                      blob.long_axis_px > kMostSize * limits.usual_size_px;
+    return closed && !line &&
+           (blob.rejection == Rejection::kIrregular ||
+            (blob.rejection == Rejection::kNone && blob.badness > kSureBadness));
 }
 
 bool is_piece(const BlobLimits& limits, const Blob& blob) {
@@ -421,6 +416,26 @@ bool is_piece(const BlobLimits& limits, const Blob& blob) {
     return could_be && (blob.hidden || blob.long_axis_px < kPieceSize * limits.usual_size_px) &&
            blob.long_axis_px < kMostSize * limits.usual_size_px;
 }
+
+// What is tried as a part of a marker, so that it can be put back.
+class Drawn {
+  public:
+    explicit Drawn(const BlobWorkspace& w) : blob_(w.blob), hidden_(w.hidden), box_(w.box) {}
+    void put_back(BlobWorkspace& w) const {
+        w.blob = blob_;
+        w.hidden = hidden_;
+        w.box = box_;
+    }
+    void put_back_blob(BlobWorkspace& w) const {
+        w.blob = blob_;
+        w.box = box_;
+    }
+
+  private:
+    BitRows blob_;
+    BitRows hidden_;
+    BitBox box_;
+};
 
 // The marker of which this blob shows a part, with a bite out of it or with something else at it, when there
 // is one; else the blob as it was.
@@ -451,22 +466,17 @@ void complete_outline(const ImageView& image, const PlaneFit& fit, const BlobLim
 // The same from all the paint around it that could be of the same marker.
 void join_pieces(const ImageView& image, Side side, const PlaneFit& fit, const BlobLimits& limits, double x,
                  double y, BlobWorkspace& w, Blob& blob) {
-    const BitRows own = w.blob;
-    const BitBox own_box = w.box;
-    const BitRows hidden = w.hidden;
+    const Drawn own(w);
     const double radius = kPieceReach * limits.usual_size_px;
     mark_disc(x, y, radius, w, w.blob);
     w.box = box_of(w.blob, 0, w.height);
     if (w.box.top == w.box.bottom) return;
     compute_cover(w, side, fit.plane, blob.contrast, kMoatReach);
-    w.blob = own;
-    w.box = own_box;
+    own.put_back_blob(w);
     w.hidden.fill(0);
     if (gather_pieces(x, y, radius, kHalf, w)) complete_outline(image, fit, limits, true, w, blob);
     if (blob.completed) return;
-    w.blob = own;
-    w.box = own_box;
-    w.hidden = hidden;
+    own.put_back(w);
 }
 
 }  // namespace
@@ -498,16 +508,15 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
         } else if (is_piece(limits, blob)) {
             join_pieces(image, side, fit, limits, blob.x_px - w.left, blob.y_px - w.top, w, blob);
         }
-        if (!several && !blob.completed && has_odd_outline(blob)) {
+        if (!several && !blob.completed && has_odd_outline(limits, blob)) {
             compute_cover(w, side, fit.plane, blob.contrast, kRedrawReach + kMoatReach);
-            const BitRows own = w.blob;
-            const BitBox own_box = w.box;
+            const Drawn own(w);
             complete_outline(image, fit, limits, false, w, blob);
-            if (!blob.completed) w.blob = own, w.box = own_box;
+            if (!blob.completed) own.put_back_blob(w);
         }
     }
     Rejection reason = Rejection::kNone;
-    if (!blob.completed && looks_shadowed(blob.rejection) && redraw_blob(w, kDeep, reason)) {
+    if (!blob.completed && looks_shadowed(blob) && redraw_blob(w, kDeep, reason)) {
         measure_outline(image, fit, kDeep, limits, w, blob);
         blob.badness += kDeepBadness;
     }

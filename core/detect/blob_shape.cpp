@@ -15,6 +15,7 @@ constexpr double kNoiseDeviationPx =
 constexpr double kSureSnr = 5.0;   // contrast / spread of the surroundings: less costs
 constexpr double kLeastSnr = 2.5;  // below: no telling it from noise
 
+constexpr double kMostShadowed = 2.0;    // badness of a marker that shows at the deep outline
 constexpr double kLongest = 1.7;         // of what a part of one may be in
 constexpr double kLeastInkDepth = 0.45;  // of it, in usual depths
 constexpr double kLeastRetroDepth = 0.25;
@@ -85,9 +86,10 @@ bool may_be_completed(Side side, const BlobLimits& limits, const Blob& blob) {
            blob.long_axis_px < kLongest * limits.usual_size_px;
 }
 
-bool looks_shadowed(Rejection rejection) {
-    return rejection == Rejection::kOpen || rejection == Rejection::kIrregular ||
-           rejection == Rejection::kElongated;
+bool looks_shadowed(const Blob& blob) {
+    const bool refused = blob.rejection == Rejection::kOpen || blob.rejection == Rejection::kIrregular ||
+                         blob.rejection == Rejection::kElongated;
+    return refused && blob.badness < kMostShadowed;
 }
 
 }  // namespace rig

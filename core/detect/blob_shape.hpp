@@ -1,9 +1,46 @@
 // What a blob's weights say of its shape, and whether a marker looks like that.
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
+
+#include "core/base/math.hpp"
+#include "core/detect/bit_rows.hpp"
 #include "core/detect/blob.hpp"
 
 namespace rig {
+
+// Rows of a window within an ellipse, as spans of bits: its centre, its second moments, and its radius in
+// roots of them (2: the ellipse of equal moments). yy > 0.
+class EllipseRows {
+  public:
+    EllipseRows(double x, double y, double xx, double xy, double yy, double roots)
+        : x_(x),
+          y_(y),
+          lean_(xy / yy),
+          per_yy_(1.0 / yy),
+          width_(std::max(0.0, xx - xy * xy / yy)),
+          square_(roots * roots) {}
+
+    [[nodiscard]] std::uint64_t at(int y) const {
+        const double dy = y - y_;
+        const double root = square_ - dy * dy * per_yy_;
+        if (!(root > 0.0)) return 0;
+        const double half = sqrt(root * width_);
+        const double middle = x_ + lean_ * dy;
+        const auto begin = static_cast<int>(std::clamp(middle - half, 0.0, 63.0) + 0.999999);
+        const auto end = static_cast<int>(std::clamp(middle + half, -1.0, 63.0) + 1.0);
+        return begin < end ? bit_span(begin, end) : 0;
+    }
+
+  private:
+    double x_;
+    double y_;
+    double lean_;
+    double per_yy_;
+    double width_;
+    double square_;
+};
 
 // Of a soft-threshold mask: its weight in pixels, centre and central second moments, px.
 struct SoftMoments {
@@ -41,7 +78,7 @@ inline constexpr double kDeepBadness = 0.25;  // of a marker that only shows at 
 // Worth completing: of the paint of the image's markers, and not so long that no marker is in it.
 [[nodiscard]] bool may_be_completed(Side side, const BlobLimits& limits, const Blob& blob);
 
-// Refused for what shadow does to an outline: worth another look at the deep one.
-[[nodiscard]] bool looks_shadowed(Rejection rejection);
+// Refused for what shadow does to an outline, and not by much: worth another look at the deep one.
+[[nodiscard]] bool looks_shadowed(const Blob& blob);
 
 }  // namespace rig

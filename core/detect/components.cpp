@@ -75,6 +75,21 @@ std::uint32_t number_of(const ComponentLabel& root, const ComponentLimits& limit
     return static_cast<std::uint32_t>(counts.components++);
 }
 
+// Sets the bounds of a component whose runs are in their places.
+void bound(const Run* grouped, Component& component) {
+    const Run* const runs = grouped + component.first;
+    std::uint32_t left = runs[0].begin;
+    std::uint32_t end = runs[0].end;
+    for (std::uint32_t i = 1; i < component.count; ++i) {
+        left = std::min<std::uint32_t>(left, runs[i].begin);
+        end = std::max<std::uint32_t>(end, runs[i].end);
+    }
+    component.left = static_cast<std::uint16_t>(left);
+    component.right = static_cast<std::uint16_t>(end - 1);
+    component.top = runs[0].y;
+    component.bottom = runs[component.count - 1].y;
+}
+
 }  // namespace
 
 ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits,
@@ -100,12 +115,10 @@ ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits
     for (std::size_t i = 0; i < total; ++i) {
         const std::uint32_t number = labels[label_of[i]].area_px;
         if (number == kNone) continue;
-        const Run run = runs[i];
         Component& component = components[number];
-        if (component.count == 0) component.top = run.y;
-        grouped[component.first + component.count] = run;
-        widen(component, run);
+        grouped[component.first + component.count++] = runs[i];
     }
+    for (std::size_t i = 0; i < counts.components; ++i) bound(grouped, components[i]);
     return counts;
 }
 

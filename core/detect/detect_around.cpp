@@ -124,9 +124,16 @@ bool Detector::search_window(const ImageView& image, Side side, const ExpectedMa
     const double largest = largest_marker(state_.usual_size_px);
     set_thresholds(means, thresholds, side, largest);
     threshold_bits(part, thresholds, side, w.window);
-    const Search search{
-        image, thresholds,  side,       largest,      state_.usual_size_px, state_.usual_depth,
-        false, window.left, window.top, window.right, window.bottom};
+    const Search search{.image = image,
+                        .thresholds = thresholds,
+                        .side = side,
+                        .largest_px = largest,
+                        .usual_size_px = state_.usual_size_px,
+                        .usual_depth = state_.usual_depth,
+                        .left = window.left,
+                        .top = window.top,
+                        .right = window.right,
+                        .bottom = window.bottom};
     const std::size_t before = result.blobs.size();
     if (!examine_window(search, expected, result)) return false;
     const bool found = std::any_of(result.blobs.begin(), result.blobs.end(), [&](const Blob& blob) {
@@ -215,6 +222,7 @@ bool Detector::search_windows(const ImageView& image, Side side, std::span<const
     result.report = DetectorReport{};
     result.second_looks = 0;
     workspace_.examined.clear();
+    set_core_steps(side);
     for (const ExpectedMarker& marker : expected) {
         if (is_usable(marker) && !search_window(image, side, marker, result)) return false;
     }

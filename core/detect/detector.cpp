@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "core/base/math.hpp"
+#include "core/base/ranked.hpp"
 #include "core/detect/blob_shape.hpp"
 #include "core/detect/components.hpp"
 #include "core/detect/edge_slope.hpp"
@@ -29,6 +30,9 @@ constexpr std::size_t kMostSecondLooks =
 constexpr double kDimmest = 0.4;  // of the least contrast, in a dim image
 constexpr double kTriedSizes = 1.5;       // long components are no one marker
 constexpr double kHopelessBadness = 1.5;  // score 0
+constexpr double kLittlePart =
+    0.3;  // of a usual size's square, some 0.4 of a marker seen from the front; and one
+constexpr std::size_t kFewParts = 2;  // among more parts than these is texture, not a core
 
 // Sixteen pixels of a row from x on; beyond the image, zeros.
 SixteenBytes pixels_at(const ImageView& image, int x, int y) {
@@ -37,6 +41,16 @@ SixteenBytes pixels_at(const ImageView& image, int x, int y) {
     std::array<std::uint8_t, kByteLanes> rest{};
     std::copy(from, image.row(y) + image.width_px, rest.begin());
     return load_bytes(rest.data());
+}
+
+// 0xFF in the bytes from `count` on.
+SixteenBytes beyond_first(int count) {
+    static constexpr std::array<std::uint8_t, 2UL * kByteLanes> kEdge = [] {
+        std::array<std::uint8_t, 2UL * kByteLanes> edge{};
+        std::fill(edge.begin() + kByteLanes, edge.end(), std::uint8_t{0xFF});
+        return edge;
+    }();
+    return load_bytes(&kEdge[static_cast<std::size_t>(kByteLanes - count)]);
 }
 
 // The parts of `runs` whose pixels are marked, as runs; marked(x, y, count): one bit for each of up to
@@ -69,13 +83,6 @@ std::size_t cut(std::span<const Run> runs, std::span<Run> out, bool& truncated, 
     return count;
 }
 
-// The value that `rank` others are no greater than; reorders them.
-double ranked(std::span<float> values, std::size_t rank) {
-    const auto place = values.begin() + static_cast<std::ptrdiff_t>(rank);
-    std::nth_element(values.begin(), place, values.end());
-    return static_cast<double>(*place);
-}
-
 bool in_range(double value, double low, double high) {
     return value >= low && value <= high;  // false for NaN
 }
@@ -101,7 +108,7 @@ std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span
     SixteenBytes least = most + 255;
     for (const Run& run : runs) {
         for (int x = run.begin; x < run.end; x += kByteLanes) {
-            const SixteenBytes outside = ~bytes_of_bits(row_mask(std::min(kByteLanes, run.end - x)));
+            const SixteenBytes outside = beyond_first(std::min(kByteLanes, run.end - x));
             const SixteenBytes v = pixels_at(search.image, x, run.y) ^ turn;
             most = most > (v & ~outside) ? most : (v & ~outside);
             least = least < (v | outside) ? least : (v | outside);
@@ -146,6 +153,10 @@ bool stands_alone(const Component& component, const Siblings& siblings) {
         if (!apart && !itself && other.area_px * kPeerAreas >= component.area_px) return false;
     }
     return true;
+}
+
+bool is_apart(const Component& component, std::span<const Run> runs, const Siblings& siblings) {
+    return stands_alone(component, siblings) && holds_its_middle(component, runs);
 }
 
 }  // namespace
@@ -232,25 +243,30 @@ void Detector::set_thresholds(const BlockGrid& means, const BlockGrid& threshold
 }
 
 // Texture and noise just reach the threshold; a marker whose mid contrast does has pixels well beyond it.
-bool Detector::has_core(const Search& search, std::span<const Run> runs) const {
-    const int least = static_cast<int>(least_contrast(search.side));
+void Detector::set_core_steps(Side side) {
+    const int least = static_cast<int>(least_contrast(side));
     const int part = static_cast<int>(config_.relative_contrast * 256.0);
-    const int whole = search.side == Side::kBelow ? 256 - part : 256 + part;
+    const int whole = side == Side::kBelow ? 256 - part : 256 + part;
+    for (int level = 0; level < 256; ++level) {  // twice the difference is a step or more
+        workspace_.core_steps[static_cast<std::size_t>(level)] =
+            static_cast<std::uint16_t>((std::max(least, level * part / whole) + 1) / 2);
+    }
+}
+
+// From the middle on, where a marker is deepest.
+bool Detector::has_core(const Search& search, std::span<const Run> runs) const {
     const int sign = search.side == Side::kBelow ? 1 : -1;
     int deep = 0;
-    int known = -1;  // the level that `most` is for
-    int most = 0;
-    for (const Run& run : runs) {
+    const std::size_t middle = runs.size() / 2;
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+        const Run& run = runs[i + middle < runs.size() ? i + middle : i + middle - runs.size()];
         const std::uint8_t* pixels = search.image.row(run.y);
         for (int x = run.begin; x < run.end;) {
             const int level = search.level(x, run.y);
-            if (level != known) {  // twice the difference is a step or more
-                most = (std::max(least, level * part / whole) + 1) / 2;
-                known = level;
-            }
+            const int step = workspace_.core_steps[static_cast<std::size_t>(level)];
             const int end = std::min<int>(run.end, x + kBlock - (x - search.left) % kBlock);
             for (; x < end; ++x) {
-                if (sign * (level - pixels[x]) >= most && ++deep == kCorePixels) return true;
+                if (sign * (level - pixels[x]) >= step && ++deep == kCorePixels) return true;
             }
         }
     }
@@ -266,15 +282,22 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
     const double largest = largest_marker(state_.usual_size_px);
     set_thresholds(means, thresholds, side, largest);
+    set_core_steps(side);
     const std::size_t count = threshold_runs(image, thresholds, side, w.runs, result.report.runs_full);
     result.report.runs = static_cast<std::uint32_t>(count);
     const ComponentCounts counts =
         connect(std::span<const Run>(w.runs).first(count), {least_area_px(config_.blob)},
                 {w.labels, w.label_of, w.grouped, w.components});
     result.report.blobs_full = counts.dropped > 0;
-    const bool follows = !(state_.usual_size_px > 0.0);
-    const Search search{image,   thresholds, side, largest,        state_.usual_size_px, state_.usual_depth,
-                        follows, 0,          0,    image.width_px, image.height_px};
+    const Search search{.image = image,
+                        .thresholds = thresholds,
+                        .side = side,
+                        .largest_px = largest,
+                        .usual_size_px = state_.usual_size_px,
+                        .usual_depth = state_.usual_depth,
+                        .first_look = !(state_.usual_size_px > 0.0),
+                        .right = image.width_px,
+                        .bottom = image.height_px};
     for (std::size_t c = 0; c < counts.components; ++c) {
         const Component& component = w.components[c];
         const std::size_t before = result.blobs.size();
@@ -292,24 +315,24 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
 // marker. Now that the size of the image's markers is known, the background is taken at that scale.
 void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResult& result) {
     Workspace& w = workspace_;
-    if (w.failed.empty() && !wide.size_follows) return;
-    double usual = wide.usual_size_px;
-    double depth = wide.usual_depth;
-    if (wide.size_follows) {
+    if (w.failed.empty() && !wide.first_look) return;
+    Search search = wide;
+    search.first_look = false;
+    if (wide.first_look) {
         const Population population = population_of(result.blobs.span(), config_.population.quorum);
-        usual = population.size_px;
-        depth = population.depth;
+        search.usual_size_px = population.size_px;
+        search.usual_depth = population.depth;
+        search.largest_px = largest_marker(population.size_px);
     }
-    const double largest = largest_marker(usual);
-    const bool narrower = largest < wide.largest_px;
-    if (narrower) set_thresholds(means, wide.thresholds, wide.side, largest);
-    const Search search{wide.image, wide.thresholds, wide.side, largest,    usual,      depth,
-                        false,      wide.left,       wide.top,  wide.right, wide.bottom};
-    if (wide.size_follows) examine_pieces(search, result);
+    const double usual = search.usual_size_px;
+    search.little_area_px = static_cast<std::uint32_t>(kLittlePart * usual * usual);
+    const bool narrower = search.largest_px < wide.largest_px;
+    if (narrower) set_thresholds(means, wide.thresholds, wide.side, search.largest_px);
+    if (wide.first_look) examine_pieces(search, result);
     for (const std::uint16_t c : w.failed) {
         const Component& component = w.components[c];
         const std::span<const Run> runs = members_of(component, w.grouped);
-        if (wide.size_follows && examine(search, component, runs, {}, result)) continue;
+        if (wide.first_look && examine(search, component, runs, {}, result)) continue;
         // What a marker may be a part of was tried as a whole; then its own parts are not.
         Search inner = search;
         if (length_of(component) < kTriedSizes * usual) inner.usual_size_px = 0.0;
@@ -356,8 +379,7 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
     limits.min_contrast = least_contrast(search.side);
     Blob blob;
     QuickStart start;
-    const bool alone = stands_alone(component, siblings) && holds_its_middle(component, runs) &&
-                       frame_component(search.image, component, start);
+    const bool alone = is_apart(component, runs, siblings) && frame_component(search.image, component, start);
     const bool quick =
         alone && measure_quickly(search.image, search.side, start, limits, workspace_.quick, blob);
     if (!quick || blob.long_axis_px < kPieceSize * limits.usual_size_px) {
@@ -373,7 +395,7 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         return blob.rejection == Rejection::kSmall || (blob.rejection == Rejection::kFaint && !sparse);
     }
     // Another look once the size of the image's markers is known.
-    if (search.size_follows && blob.badness > kSureBadness) return false;
+    if (search.first_look && blob.badness > kSureBadness) return false;
     if (!result.blobs.push_back(blob)) result.report.blobs_full = true;
     return true;
 }
@@ -399,6 +421,9 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
         const Component& part = storage.components[c];
         const std::span<const Run> members = members_of(part, storage.grouped);
         if (search.cuts_off(part)) continue;  // another window sees all of it, or nobody does
+        // One little part among several of something larger is texture, unless it is clear of the others.
+        const bool little = part.area_px < search.little_area_px;
+        if (little && counts.components > kFewParts && !is_apart(part, members, all)) continue;
         if (!whole && examine(search, part, members, all, result)) continue;
         if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
     }

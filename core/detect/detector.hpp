@@ -104,15 +104,16 @@ class Detector {
     struct Search {
         const ImageView& image;
         const BlockGrid& thresholds;
-        Side side;
-        double largest_px;     // longest marker
-        double usual_size_px;  // long axis of the image's markers; 0: unknown,
-        double usual_depth;    // of their depths; 0: unknown
-        bool size_follows;     // for now
-        int left;              // px: what is looked at, and where the thresholds' grid begins
-        int top;
-        int right;  // exclusive
-        int bottom;
+        Side side = Side::kBelow;
+        double largest_px = 0.0;           // longest marker
+        double usual_size_px = 0.0;        // long axis of the image's markers; 0: unknown,
+        double usual_depth = 0.0;          // of their depths; 0: unknown
+        bool first_look = false;           // the markers' size is not known yet: odd blobs get another look
+        std::uint32_t little_area_px = 0;  // of a part among several, below which it must stand clear
+        int left = 0;                      // px: what is looked at, and where the thresholds' grid begins
+        int top = 0;
+        int right = 0;  // exclusive
+        int bottom = 0;
 
         [[nodiscard]] int level(int x, int y) const {
             return thresholds
@@ -166,6 +167,7 @@ class Detector {
         std::array<std::uint8_t, kMaxBlocks> means{};
         std::array<std::uint8_t, kMaxBlocks> background{};
         std::array<std::uint8_t, kSlideBytes> slide{};
+        std::array<std::uint16_t, 256> core_steps{};  // by threshold: how far beyond it a core is
         std::array<Run, kMaxRuns> runs{};
         std::array<ComponentLabel, kMaxRuns> labels{};
         std::array<std::uint16_t, kMaxRuns> label_of{};
@@ -209,6 +211,7 @@ class Detector {
                SideResult& result);
     [[nodiscard]] bool examine(const Search& search, const Component& component, std::span<const Run> runs,
                                const Siblings& siblings, SideResult& result);
+    void set_core_steps(Side side);
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
     void apply_population(const ImageView& image, Side side, SideResult& result) const;
     [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);

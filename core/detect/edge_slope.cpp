@@ -2,36 +2,47 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstring>
 
 #include "core/base/math.hpp"
+#include "core/base/ranked.hpp"
+#include "core/image/pixel_lanes.hpp"
 
 namespace rig {
 
 namespace {
 
-struct Direction {
-    double x;
-    double y;
-};
+constexpr float kStepPx = 1.0F;              // to either side of the outline
+constexpr float kC1 = 0.92387953251128674F;  // cosines of a sixteenth and an eighth of a turn
+constexpr float kC2 = 0.70710678118654752F;
+constexpr float kC3 = 0.38268343236508977F;
+constexpr std::array<FourFloats, 2> kHalfTurnX{FourFloats{1.0F, kC1, kC2, kC3},
+                                               FourFloats{0.0F, -kC3, -kC2, -kC1}};
+constexpr std::array<FourFloats, 2> kHalfTurnY{FourFloats{0.0F, kC3, kC2, kC1},
+                                               FourFloats{1.0F, kC1, kC2, kC3}};
 
-constexpr double kStepPx = 1.0;              // to either side of the outline
-constexpr double kC1 = 0.92387953251128674;  // cosines of a sixteenth and an eighth of a turn
-constexpr double kC2 = 0.70710678118654752;
-constexpr double kC3 = 0.38268343236508977;
-constexpr std::array<Direction, 8> kHalfTurn{
-    {{1.0, 0.0}, {kC1, kC3}, {kC2, kC2}, {kC3, kC1}, {0.0, 1.0}, {-kC3, kC1}, {-kC2, kC2}, {-kC1, kC3}}};
-
-// Between four pixels; beyond the border, the border's.
-double level_at(const ImageView& image, double x, double y) {
-    x = std::clamp(x, 0.0, image.width_px - 1.0);
-    y = std::clamp(y, 0.0, image.height_px - 1.0);
-    const int left = std::min(static_cast<int>(x), image.width_px - 2);
-    const int top = std::min(static_cast<int>(y), image.height_px - 2);
-    const std::uint8_t* upper = image.row(top) + left;
-    const std::uint8_t* lower = image.row(top + 1) + left;
-    const double u = x - left;
-    const double v = y - top;
-    return (1.0 - v) * ((1.0 - u) * upper[0] + u * upper[1]) + v * ((1.0 - u) * lower[0] + u * lower[1]);
+// Between four pixels each; beyond the border, the border's.
+FourFloats levels_at(const ImageView& image, FourFloats x, FourFloats y) {
+    x = less_of(greater_of(x, FourFloats{}), all_four(static_cast<float>(image.width_px - 1)));
+    y = less_of(greater_of(y, FourFloats{}), all_four(static_cast<float>(image.height_px - 1)));
+    const FourFloats most_left = all_four(static_cast<float>(image.width_px - 2));
+    const FourFloats most_top = all_four(static_cast<float>(image.height_px - 2));
+    const FourInts left = __builtin_convertvector(less_of(x, most_left), FourInts);
+    const FourInts top = __builtin_convertvector(less_of(y, most_top), FourInts);
+    const FourFloats u = x - __builtin_convertvector(left, FourFloats);
+    const FourFloats v = y - __builtin_convertvector(top, FourFloats);
+    FourInts upper_left, upper_right, lower_left, lower_right;
+    for (int i = 0; i < 4; ++i) {
+        const std::uint8_t* upper = image.row(top[i]) + left[i];
+        const std::uint8_t* lower = upper + image.stride_bytes;
+        upper_left[i] = upper[0], upper_right[i] = upper[1];
+        lower_left[i] = lower[0], lower_right[i] = lower[1];
+    }
+    const auto floats = [](FourInts ints) { return __builtin_convertvector(ints, FourFloats); };
+    const FourFloats above = (1.0F - u) * floats(upper_left) + u * floats(upper_right);
+    const FourFloats below = (1.0F - u) * floats(lower_left) + u * floats(lower_right);
+    return (1.0F - v) * above + v * below;
 }
 
 }  // namespace
@@ -40,28 +51,30 @@ double edge_slope(const ImageView& image, Side side, const Blob& blob) {
     const double determinant = blob.xx * blob.yy - blob.xy * blob.xy;
     if (image.width_px < 2 || image.height_px < 2 || !(blob.xx > 0.0) || !(determinant > 0.0)) return 0.0;
     // The outline is the circle of radius 2 under the root of the moments.
+    const auto of = [](double value) { return all_four(static_cast<float>(value)); };
     const double root_xx = sqrt(blob.xx);
-    const double root_xy = blob.xy / root_xx;
-    const double root_yy = sqrt(determinant / blob.xx);
-    std::array<float, 2 * kHalfTurn.size()> changes;
-    std::size_t count = 0;
-    for (const Direction& d : kHalfTurn) {
-        const double dx = 2.0 * root_xx * d.x;
-        const double dy = 2.0 * (root_xy * d.x + root_yy * d.y);
-        double nx = blob.yy * dx - blob.xy * dy;
-        double ny = blob.xx * dy - blob.xy * dx;
-        const double length = sqrt(nx * nx + ny * ny);
-        nx *= kStepPx / length;
-        ny *= kStepPx / length;
-        for (const double sign : {1.0, -1.0}) {
-            const double out = level_at(image, blob.x_px + sign * (dx + nx), blob.y_px + sign * (dy + ny));
-            const double in = level_at(image, blob.x_px + sign * (dx - nx), blob.y_px + sign * (dy - ny));
-            changes[count++] = static_cast<float>(out - in);
-        }
+    const FourFloats xx = of(2.0 * root_xx), xy = of(2.0 * blob.xy / root_xx);
+    const FourFloats yy = of(2.0 * sqrt(determinant / blob.xx));
+    const FourFloats centre_x = of(blob.x_px), centre_y = of(blob.y_px);
+    std::array<float, 16> changes;
+    for (std::size_t half = 0; half < 2; ++half) {
+        const FourFloats dx = xx * kHalfTurnX[half];
+        const FourFloats dy = xy * kHalfTurnX[half] + yy * kHalfTurnY[half];
+        FourFloats nx = of(blob.yy) * dx - of(blob.xy) * dy;
+        FourFloats ny = of(blob.xx) * dy - of(blob.xy) * dx;
+        const FourFloats square = nx * nx + ny * ny;
+        const FourFloats scale = kStepPx / roots_of(square);
+        nx *= scale;
+        ny *= scale;
+        const FourFloats out_x = dx + nx, out_y = dy + ny, in_x = dx - nx, in_y = dy - ny;
+        const FourFloats one = levels_at(image, centre_x + out_x, centre_y + out_y) -
+                               levels_at(image, centre_x + in_x, centre_y + in_y);
+        const FourFloats other = levels_at(image, centre_x - out_x, centre_y - out_y) -
+                                 levels_at(image, centre_x - in_x, centre_y - in_y);
+        std::memcpy(&changes[8 * half], &one, sizeof(one));
+        std::memcpy(&changes[8 * half + 4], &other, sizeof(other));
     }
-    const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(changes.begin(), middle, changes.end());
-    const double change = static_cast<double>(*middle) / blob.contrast;
+    const double change = ranked(changes, changes.size() / 2) / blob.contrast;
     return side == Side::kBelow ? change : -change;
 }
 

@@ -3,36 +3,41 @@
 #include <algorithm>
 #include <bit>
 
-#include "core/base/bounded_vector.hpp"
+#include "core/base/dense.hpp"
 #include "core/base/math.hpp"
+#include "core/image/pixel_lanes.hpp"
 
 namespace rig {
 
 namespace {
 
 struct Point {
-    double x = 0.0;
-    double y = 0.0;
+    float x = 0.0F;
+    float y = 0.0F;
 };
 
 constexpr std::size_t kMaxPoints = 256;
 constexpr std::size_t kMinPoints = 10;
 constexpr std::size_t kUnknowns = 5;
-constexpr double kFollows = 0.45;                        // px between the ellipse and what follows it
-constexpr std::array kReaches{1.2, 0.8, 0.5, 0.4, 0.4};  // px, of rounds after the first
-constexpr double kDiagonal = 0.70710678118654752;
-constexpr std::array<Point, 8> kDirections{{{1.0, 0.0},
+constexpr float kFollows = 0.45F;                // px between the ellipse and what follows it
+constexpr float kMayFollow = 1.2F;               // px, of what may follow it after the rounds to come
+constexpr std::array kFirstReaches{1.2F, 0.8F};  // px, of rounds after the one of equal weights
+constexpr std::array kLastReaches{0.5F, 0.4F, 0.4F};
+constexpr double kSamePx = 0.05;    // centres of two ellipses that are one,
+constexpr double kSamePart = 0.02;  // and their moments, relative
+constexpr float kDiagonal = 0.70710678118654752F;
+constexpr std::array<Point, 8> kDirections{{{1.0F, 0.0F},
                                             {kDiagonal, kDiagonal},
-                                            {0.0, 1.0},
+                                            {0.0F, 1.0F},
                                             {-kDiagonal, kDiagonal},
-                                            {-1.0, 0.0},
+                                            {-1.0F, 0.0F},
                                             {-kDiagonal, -kDiagonal},
-                                            {0.0, -1.0},
+                                            {0.0F, -1.0F},
                                             {kDiagonal, -kDiagonal}}};
-constexpr double kLeftOutCosine2 = 0.4;          // 51 degrees to either side
+constexpr float kLeftOutCosine2 = 0.4F;          // 51 degrees to either side
 constexpr double kAgreed = 0.85;                 // part followed times part filled
 constexpr int kSectors = 16;                     // of the rim
-constexpr double kEighth = 0.41421356237309503;  // tangent of an eighth of half a turn
+constexpr float kEighth = 0.41421356237309503F;  // tangent of an eighth of half a turn
 constexpr double kInside = 0.8;                  // px within the ellipse where there should be paint,
 constexpr double kOutside = 1.0;                 // and outside it where there should be none
 constexpr double kRimPx = 1.0;                   // what reaches so far out goes on beyond
@@ -40,7 +45,26 @@ constexpr int kLeastPiece = 3;                   // pixels
 constexpr double kLeastFollowed = 0.6;
 constexpr double kLeastFilled = 0.5;
 
-using Points = BoundedVector<Point, kMaxPoints>;
+struct Origin {
+    double x = 0.0;
+    double y = 0.0;
+};
+
+// Points about their mean, in whole vectors: zeros behind the last.
+struct Points {
+    std::array<float, kMaxPoints> x{};
+    std::array<float, kMaxPoints> y{};
+    std::size_t count = 0;
+
+    [[nodiscard]] FourFloats four_x(std::size_t first) const { return load_floats(&x[first]); }
+    [[nodiscard]] FourFloats four_y(std::size_t first) const { return load_floats(&y[first]); }
+    [[nodiscard]] bool push_back(float at_x, float at_y) {
+        if (count == kMaxPoints) return false;
+        x[count] = at_x;
+        y[count++] = at_y;
+        return true;
+    }
+};
 
 // a x^2 + b xy + c y^2 + d x + e y = 1
 using Conic = std::array<double, kUnknowns>;
@@ -52,8 +76,9 @@ bool has(const BitRows& rows, int x, int y) {
 // Where cover passes the outline between a pixel of the blob and one beside it.
 void gather_points(const BlobWorkspace& w, int outline, Points& points) {
     const auto cover = [&](int x, int y) {
-        return static_cast<double>(w.cover[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)]);
+        return static_cast<float>(w.cover[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)]);
     };
+    const auto level = static_cast<float>(outline);
     for (int y = 1; y + 1 < w.height; ++y) {
         for (std::uint64_t bits = w.blob[static_cast<std::size_t>(y)]; bits != 0; bits &= bits - 1) {
             const int x = std::countr_zero(bits);
@@ -62,75 +87,109 @@ void gather_points(const BlobWorkspace& w, int outline, Points& points) {
             for (const auto& step : kSteps) {
                 if (has(w.blob, x + step[0], y + step[1])) continue;
                 if (has(w.foreign, x + step[0], y + step[1])) continue;
-                const double in = cover(x, y) - outline;
-                const double out = cover(x + step[0], y + step[1]) - outline;
-                const double part = in > 0.0 && out < 0.0 ? in / (in - out) : 0.5;
-                if (!points.push_back({x + part * step[0], y + part * step[1]})) return;
+                const float in = cover(x, y) - level;
+                const float out = cover(x + step[0], y + step[1]) - level;
+                const float part = in > 0.0F && out < 0.0F ? in / (in - out) : 0.5F;
+                if (!points.push_back(static_cast<float>(x) + part * static_cast<float>(step[0]),
+                                      static_cast<float>(y) + part * static_cast<float>(step[1])))
+                    return;
             }
         }
     }
 }
 
-// Cholesky; false when the points do not fix a conic.
-bool solve(std::array<std::array<double, kUnknowns>, kUnknowns>& m, Conic& right) {
-    for (std::size_t i = 0; i < kUnknowns; ++i) {
-        for (std::size_t j = 0; j <= i; ++j) {
-            double sum = m[i][j];
-            for (std::size_t k = 0; k < j; ++k) sum -= m[i][k] * m[j][k];
-            if (i != j) {
-                m[i][j] = sum / m[j][j];
-            } else if (sum > 1e-12 * m[i][i]) {
-                m[i][i] = sqrt(sum);
-            } else {
-                return false;
-            }
-        }
-    }
-    for (std::size_t i = 0; i < kUnknowns; ++i) {
-        for (std::size_t k = 0; k < i; ++k) right[i] -= m[i][k] * right[k];
-        right[i] /= m[i][i];
-    }
-    for (std::size_t i = kUnknowns; i-- > 0;) {
-        for (std::size_t k = i + 1; k < kUnknowns; ++k) right[i] -= m[k][i] * right[k];
-        right[i] /= m[i][i];
-    }
-    return true;
+double sum_of_four(FourFloats v) {
+    return (static_cast<double>(v[0]) + static_cast<double>(v[1])) +
+           (static_cast<double>(v[2]) + static_cast<double>(v[3]));
 }
 
-// Signed distance to first order, px, and the conic's slope there.
-double distance_to(const Conic& q, const Point& p, double& slope) {
-    const double value =
-        q[0] * p.x * p.x + q[1] * p.x * p.y + q[2] * p.y * p.y + q[3] * p.x + q[4] * p.y - 1.0;
-    const double gx = 2.0 * q[0] * p.x + q[1] * p.y + q[3];
-    const double gy = q[1] * p.x + 2.0 * q[2] * p.y + q[4];
-    slope = sqrt(gx * gx + gy * gy) + 1e-12;
-    return value / slope;
-}
+// Sums of weight x^i y^j, four points at a time.
+struct PowerSums {
+    FourFloats x{}, y{}, xx{}, xy{}, yy{}, xxx{}, xxy{}, xyy{}, yyy{};
+    FourFloats xxxx{}, xxxy{}, xxyy{}, xyyy{}, yyyy{};
 
-bool fit_conic(std::span<const Point> points, double reach, Conic& conic) {
-    std::array<std::array<double, kUnknowns>, kUnknowns> m{};
-    Conic right{};
-    for (const Point& p : points) {
-        double weight = 1.0;
-        if (reach > 0.0) {
-            double slope = 0.0;
-            const double off = distance_to(conic, p, slope) / reach;
-            const double fall = 1.0 / (1.0 + off * off);
-            weight = fall * fall / (slope * slope);
-        }
-        const Conic row{p.x * p.x, p.x * p.y, p.y * p.y, p.x, p.y};
-        for (std::size_t i = 0; i < kUnknowns; ++i) {
-            const double scaled = weight * row[i];
-            for (std::size_t j = 0; j <= i; ++j) m[i][j] += scaled * row[j];
-            right[i] += scaled;
-        }
+    void add(FourFloats weight, FourFloats px, FourFloats py) {
+        const FourFloats wx = weight * px, wy = weight * py;
+        const FourFloats wxx = wx * px, wxy = wx * py, wyy = wy * py;
+        const FourFloats wxxx = wxx * px, wxxy = wxx * py, wxyy = wyy * px, wyyy = wyy * py;
+        x += wx, y += wy, xx += wxx, xy += wxy, yy += wyy;
+        xxx += wxxx, xxy += wxxy, xyy += wxyy, yyy += wyyy;
+        xxxx += wxxx * px, xxxy += wxxx * py, xxyy += wxxy * py, xyyy += wyyy * px, yyyy += wyyy * py;
     }
-    if (!solve(m, right)) return false;
+};
+
+// False when the points do not fix a conic.
+bool solve(const PowerSums& s, Conic& conic) {
+    const auto row = [](double a, double b, double c, double d, double e) { return Conic{a, b, c, d, e}; };
+    const double xxyy = sum_of_four(s.xxyy), xxy = sum_of_four(s.xxy), xyy = sum_of_four(s.xyy);
+    const Conic right =
+        row(sum_of_four(s.xx), sum_of_four(s.xy), sum_of_four(s.yy), sum_of_four(s.x), sum_of_four(s.y));
+    std::array<Conic, kUnknowns> m{row(sum_of_four(s.xxxx), 0.0, 0.0, 0.0, 0.0),
+                                   row(sum_of_four(s.xxxy), xxyy, 0.0, 0.0, 0.0),
+                                   row(xxyy, sum_of_four(s.xyyy), sum_of_four(s.yyyy), 0.0, 0.0),
+                                   row(sum_of_four(s.xxx), xxy, xyy, right[0], 0.0),
+                                   row(xxy, xyy, sum_of_four(s.yyy), right[1], right[2])};
+    if (!cholesky(m[0].data(), m[0].data(), kUnknowns, kUnknowns)) return false;
     conic = right;
+    solve_lower(m[0].data(), kUnknowns, kUnknowns, conic.data());
+    solve_lower_transposed(m[0].data(), kUnknowns, kUnknowns, conic.data());
     return true;
 }
 
-bool ellipse_of(const Conic& q, const Point& origin, Ellipse& ellipse) {
+// Four points' values of a conic and the squares of its slope there; value / slope is the signed distance,
+// px, to first order.
+struct FourDistances {
+    FourFloats value;
+    FourFloats slope2;
+};
+
+FourDistances distances_to(const Conic& q, FourFloats x, FourFloats y) {
+    const auto all = [](double v) { return all_four(static_cast<float>(v)); };
+    const FourFloats gx = all(2.0 * q[0]) * x + all(q[1]) * y + all(q[3]);
+    const FourFloats gy = all(q[1]) * x + all(2.0 * q[2]) * y + all(q[4]);
+    const FourFloats value = (gx + all(q[3])) * x * 0.5F + (gy + all(q[4])) * y * 0.5F - 1.0F;
+    return {value, gx * gx + gy * gy + 1e-12F};
+}
+
+// Weights fall with the square of 1 + (distance / reach)^2.
+bool fit_conic(const Points& points, float reach, Conic& conic) {
+    PowerSums sums;
+    const FourFloats reach2 = all_four(reach * reach);
+    for (std::size_t i = 0; i < points.count; i += 4) {
+        const FourFloats x = points.four_x(i), y = points.four_y(i);
+        const FourDistances d = distances_to(conic, x, y);
+        const FourFloats near = d.slope2 * reach2;
+        const FourFloats both = near + d.value * d.value;
+        sums.add(near / (both * both), x, y);
+    }
+    return solve(sums, conic);
+}
+
+// To all points but those within an eighth of a turn or so of a direction (0, 0: to all), with equal weights.
+bool fit_first(const Points& points, const Point& left_out, Conic& conic) {
+    using FourMasks = std::int32_t __attribute__((vector_size(16)));
+    PowerSums sums;
+    FourMasks out_count{};
+    for (std::size_t i = 0; i < points.count; i += 4) {
+        const FourFloats x = points.four_x(i), y = points.four_y(i);
+        const FourFloats along = x * left_out.x + y * left_out.y;
+        const FourMasks out = (along > FourFloats{}) & (along * along > kLeftOutCosine2 * (x * x + y * y));
+        out_count -= out;
+        sums.add(reinterpret_cast<FourFloats>(~out & reinterpret_cast<FourMasks>(all_four(1.0F))), x, y);
+    }
+    if (points.count < kMinPoints + static_cast<std::size_t>(sum_of_ints(out_count))) return false;
+    return solve(sums, conic);
+}
+
+template <std::size_t kRounds>
+bool fit_in_rounds(const Points& points, const std::array<float, kRounds>& reaches, Conic& conic) {
+    for (const float reach : reaches) {
+        if (!fit_conic(points, reach, conic)) return false;
+    }
+    return true;
+}
+
+bool ellipse_of(const Conic& q, const Origin& origin, Ellipse& ellipse) {
     const double determinant = 4.0 * q[0] * q[2] - q[1] * q[1];
     if (!(determinant > 0.0) || !(q[0] > 0.0)) return false;
     const double x = (q[1] * q[4] - 2.0 * q[2] * q[3]) / determinant;
@@ -146,82 +205,68 @@ bool ellipse_of(const Conic& q, const Point& origin, Ellipse& ellipse) {
     return ellipse.xx > 0.0 && ellipse.xx < 1e4 && ellipse.yy < 1e4;
 }
 
-// Part of the rim, in equal steps of the angle at which it is a circle, with a point of the outline on it.
-double followed_part(std::span<const Point> points, const Conic& conic, const Point& origin,
+// Part of the rim, in equal steps of the angle at which it is a circle, with a point of the outline within
+// `reach` px of it.
+double followed_part(const Points& points, float reach, const Conic& conic, const Origin& origin,
                      const Ellipse& e) {
-    const double ux = 1.0 / sqrt(e.xx);
-    const double lean = e.xy / e.xx;
-    const double vy = 1.0 / sqrt(std::max(1e-9, e.yy - lean * e.xy));
+    const auto ux = static_cast<float>(1.0 / sqrt(e.xx));
+    const auto lean = static_cast<float>(e.xy / e.xx);
+    const auto vy = static_cast<float>(1.0 / sqrt(std::max(1e-9, e.yy - e.xy / e.xx * e.xy)));
+    const auto centre_x = static_cast<float>(e.x - origin.x);
+    const auto centre_y = static_cast<float>(e.y - origin.y);
+    const FourFloats reach2 = all_four(reach * reach);
     std::uint32_t sectors = 0;
-    for (const Point& p : points) {
-        double slope = 0.0;
-        const double off = distance_to(conic, p, slope);
-        if (off > kFollows || off < -kFollows) continue;
-        const double dx = origin.x + p.x - e.x;
-        const double u = ux * dx;
-        const double v = vy * (origin.y + p.y - e.y - lean * dx);
-        const double long_side = std::max(u < 0.0 ? -u : u, v < 0.0 ? -v : v);
-        const double short_side = std::min(u < 0.0 ? -u : u, v < 0.0 ? -v : v);
-        const int sector = (u < 0.0 ? 8 : 0) + (v < 0.0 ? 4 : 0) +
-                           ((u < 0.0 ? -u : u) < (v < 0.0 ? -v : v) ? 2 : 0) +
-                           (short_side > kEighth * long_side ? 1 : 0);
-        sectors |= 1U << sector;
+    for (std::size_t i = 0; i < points.count; i += 4) {
+        const FourFloats x = points.four_x(i), y = points.four_y(i);
+        const FourDistances d = distances_to(conic, x, y);
+        const auto off = d.value * d.value > reach2 * d.slope2;
+        const FourFloats dx = x - centre_x;
+        const FourFloats u = ux * dx;
+        const FourFloats v = vy * (y - centre_y - lean * dx);
+        const FourFloats u_size = greater_of(u, -u), v_size = greater_of(v, -v);
+        const auto steep = greater_of(u_size, v_size) * kEighth < less_of(u_size, v_size);
+        const auto sector =
+            ((u < FourFloats{}) & 8) + ((v < FourFloats{}) & 4) + ((u_size < v_size) & 2) + (steep & 1);
+        for (std::size_t k = 0; k < 4 && i + k < points.count; ++k) {
+            if (off[k] == 0) sectors |= 1U << sector[k];
+        }
     }
     return static_cast<double>(ones(sectors)) / kSectors;
 }
 
-// Pixels of row y within the ellipse grown by `by` px, as a span of bits.
-std::uint64_t span_of(const Ellipse& e, int y, double by) {
+// The ellipse grown by `by` px.
+EllipseRows rows_of(const Ellipse& e, double by) {
     const double mean = sqrt(sqrt(std::max(1e-9, e.xx * e.yy - e.xy * e.xy)));  // half the mean radius
-    const double grown = std::max(0.0, 2.0 + by / mean);
-    const double dy = y - e.y;
-    const double root = grown * grown - dy * dy / e.yy;
-    if (!(root > 0.0)) return 0;
-    const double half = sqrt(root * std::max(0.0, e.xx - e.xy * e.xy / e.yy));
-    const double middle = e.x + e.xy / e.yy * dy;
-    const auto begin = static_cast<int>(std::clamp(middle - half, 0.0, 63.0) + 0.999999);
-    const auto end = static_cast<int>(std::clamp(middle + half, -1.0, 63.0) + 1.0);
-    return begin < end ? bit_span(begin, end) : 0;
+    return {e.x, e.y, e.xx, e.xy, e.yy, std::max(0.0, 2.0 + by / mean)};
 }
 
 // Of the ellipse, the part that is paint.
 double filled_part(const Ellipse& ellipse, const BlobWorkspace& w) {
+    const EllipseRows rows = rows_of(ellipse, -kInside);
     int all = 0;
     int paint = 0;
     for (int y = 0; y < w.height; ++y) {
-        const std::uint64_t inner = span_of(ellipse, y, -kInside) & row_mask(w.width);
+        const std::uint64_t inner = rows.at(y) & row_mask(w.width);
         all += ones(inner);
         paint += ones(inner & w.blob[static_cast<std::size_t>(y)]);
     }
     return all == 0 ? 0.0 : static_cast<double>(paint) / all;
 }
 
-// Leaves out what lies within an eighth of a turn or so of a direction.
-void leave_out(const Point& direction, Points& points) {
-    std::size_t kept = 0;
-    for (const Point& p : points) {
-        const double along = p.x * direction.x + p.y * direction.y;
-        if (along > 0.0 && along * along > kLeftOutCosine2 * (p.x * p.x + p.y * p.y)) continue;
-        points[kept++] = p;
-    }
-    points.resize(kept);
-}
-
-bool fit_in_rounds(std::span<const Point> some, std::span<const Point> all, Conic& conic) {
-    if (some.size() < kMinPoints || !fit_conic(some, 0.0, conic)) return false;
-    for (const double reach : kReaches) {
-        if (!fit_conic(all, reach, conic)) return false;
-    }
-    return true;
+bool are_one(const Ellipse& a, const Ellipse& b) {
+    const auto near = [](double v, double w, double by) { return v - w < by && w - v < by; };
+    return near(a.x, b.x, kSamePx) && near(a.y, b.y, kSamePx) && near(a.xx, b.xx, kSamePart * b.xx) &&
+           near(a.xy, b.xy, kSamePart * (b.xx + b.yy)) && near(a.yy, b.yy, kSamePart * b.yy);
 }
 
 }  // namespace
 
 void mark_disc(double x, double y, double radius, const BlobWorkspace& w, BitRows& disc) {
-    const Ellipse circle{x, y, 0.25 * radius * radius, 0.0, 0.25 * radius * radius};
+    const double square = std::max(1e-9, 0.25 * radius * radius);
+    const EllipseRows rows(x, y, square, 0.0, square, 2.0);
     disc.fill(0);
     for (int row = 0; row < w.height; ++row) {
-        disc[static_cast<std::size_t>(row)] = span_of(circle, row, 0.0) & row_mask(w.width);
+        disc[static_cast<std::size_t>(row)] = rows.at(row) & row_mask(w.width);
     }
 }
 
@@ -250,21 +295,35 @@ bool gather_pieces(double x, double y, double radius, int outline, BlobWorkspace
 bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
     Points points;
     gather_points(w, outline, points);
-    if (points.size() < kMinPoints) return false;
-    Point origin;
-    for (const Point& p : points) origin.x += p.x, origin.y += p.y;
-    origin.x /= static_cast<double>(points.size());
-    origin.y /= static_cast<double>(points.size());
-    for (Point& p : points) p.x -= origin.x, p.y -= origin.y;
+    if (points.count < kMinPoints) return false;
+    Origin origin;
+    for (std::size_t i = 0; i < points.count; ++i) {
+        origin.x += static_cast<double>(points.x[i]), origin.y += static_cast<double>(points.y[i]);
+    }
+    origin.x /= static_cast<double>(points.count);
+    origin.y /= static_cast<double>(points.count);
+    for (std::size_t i = 0; i < points.count; ++i) {
+        points.x[i] -= static_cast<float>(origin.x), points.y[i] -= static_cast<float>(origin.y);
+    }
     double best = 0.0;
+    std::array<Ellipse, kDirections.size() + 1> tried;
+    std::size_t tries = 0;
     // From all points, and then, unless those agree, without those on one side after the other.
     for (std::size_t start = 0; start <= kDirections.size() && best < kAgreed; ++start) {
-        Points some = points;
-        if (start > 0) leave_out(kDirections[start - 1], some);
+        const Point left_out = start > 0 ? kDirections[start - 1] : Point{};
         Conic conic{};
         Ellipse fitted;
-        if (!fit_in_rounds(some.span(), points.span(), conic) || !ellipse_of(conic, origin, fitted)) continue;
-        fitted.followed = followed_part(points.span(), conic, origin, fitted);
+        if (!fit_first(points, left_out, conic) || !fit_in_rounds(points, kFirstReaches, conic)) continue;
+        if (ellipse_of(conic, origin, fitted)) {  // if it is none yet, it may become one
+            const auto before = std::span(tried).first(tries);
+            const auto same = [&](const Ellipse& e) { return are_one(e, fitted); };
+            if (std::any_of(before.begin(), before.end(), same)) continue;
+            tried[tries++] = fitted;
+            if (followed_part(points, kMayFollow, conic, origin, fitted) < kLeastFollowed) continue;
+        }
+        if (!fit_in_rounds(points, kLastReaches, conic) || !ellipse_of(conic, origin, fitted)) continue;
+        fitted.followed = followed_part(points, kFollows, conic, origin, fitted);
+        if (fitted.followed <= best) continue;
         const double quality = fitted.followed * filled_part(fitted, w);
         if (quality <= best) continue;
         best = quality;
@@ -274,13 +333,15 @@ bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
 }
 
 bool keep_ellipse(const Ellipse& ellipse, BlobWorkspace& w) {
+    const EllipseRows inner_rows = rows_of(ellipse, -kInside);
+    const EllipseRows outer_rows = rows_of(ellipse, kOutside);
     int all = 0;
     int paint = 0;
     for (int y = 0; y < w.height; ++y) {
         const auto row = static_cast<std::size_t>(y);
         const std::uint64_t mask = row_mask(w.width);
-        const std::uint64_t inner = span_of(ellipse, y, -kInside) & mask;
-        const std::uint64_t outer = span_of(ellipse, y, kOutside) & mask;
+        const std::uint64_t inner = inner_rows.at(y) & mask;
+        const std::uint64_t outer = outer_rows.at(y) & mask;
         w.hidden[row] |= (inner & ~w.blob[row]) | (w.blob[row] & ~outer);
         all += ones(inner);
         paint += ones(inner & w.blob[row]);

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/base/math.hpp"
+#include "core/base/ranked.hpp"
 
 namespace rig {
 
@@ -30,13 +31,6 @@ constexpr double kSlopeNoise = 0.9;  // standard deviations of the slope, per no
 constexpr double kAloneOpen = 0.03;
 constexpr double kRetroLack = 0.62;       // of the paint's depth: what angles explain; beyond it,
 constexpr double kRetroLackSpread = 0.2;  // one unit of badness more
-
-// The value that half of the others are no greater than; reorders them.
-double median(std::span<float> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return static_cast<double>(*middle);
-}
 
 double spread_about(double centre, std::span<float> values) {
     for (float& value : values) {

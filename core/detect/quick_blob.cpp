@@ -508,7 +508,7 @@ bool QuickMeasure::run(Blob& blob) {
     }
     if (!draw(kHalfOutline, blob.contrast)) return false;
     judge(kHalfOutline, blob);
-    if (looks_shadowed(blob.rejection) && draw(kDeepOutline, blob.contrast)) {
+    if (looks_shadowed(blob) && draw(kDeepOutline, blob.contrast)) {
         judge(kDeepOutline, blob);
         blob.badness += kDeepBadness;
     }

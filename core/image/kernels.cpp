@@ -136,16 +136,30 @@ struct BlockRow {
     std::size_t rows = 0;
 };
 
-// One word from pixel `first` on, of kRows at once, so that their levels are spread once.
+// The pixel that is farthest beyond any level, of each of sixteen columns.
+template <Side kSide, std::size_t kRows>
+SixteenBytes extremes(const BlockRow& of, std::size_t x) {
+    SixteenBytes extreme = load_bytes(of.pixels[0] + x);
+    for (std::size_t r = 1; r < kRows; ++r) {
+        const SixteenBytes other = load_bytes(of.pixels[r] + x);
+        extreme =
+            kSide == Side::kBelow ? (extreme < other ? extreme : other) : (extreme > other ? extreme : other);
+    }
+    return extreme;
+}
+
+// One word from pixel `first` on, of kRows at once, so that their levels are spread once; most vectors have
+// no pixel beyond.
 template <Side kSide, std::size_t kRows>
 void mark_word(const BlockRow& of, std::size_t first, RowWords* words) {
     std::uint64_t bits[kRows]{};
     for (std::size_t x = 0; x < kWordPx; x += kLanes) {
         const SixteenBytes levels = load_four_times_each(of.levels + (first + x) / kBlockPx);
+        if (within<kSide>(extremes<kSide, kRows>(of, first + x), levels) == 0xFFFF) continue;
         for (std::size_t r = 0; r < kRows; ++r)
-            bits[r] |= within<kSide>(load_bytes(of.pixels[r] + first + x), levels) << x;
+            bits[r] |= (within<kSide>(load_bytes(of.pixels[r] + first + x), levels) ^ 0xFFFF) << x;
     }
-    for (std::size_t r = 0; r < kRows; ++r) words[r][first / kWordPx] = ~bits[r];
+    for (std::size_t r = 0; r < kRows; ++r) words[r][first / kWordPx] = bits[r];
 }
 
 // The last word, where it is not whole: `pixels` of it.

@@ -31,6 +31,12 @@ using EightSums = std::uint16_t __attribute__((vector_size(16)));
     return FourFloats{} + value;
 }
 
+[[nodiscard]] inline FourFloats load_floats(const float* from) {
+    FourFloats four;
+    std::memcpy(&four, from, sizeof(four));
+    return four;
+}
+
 // `first`, `first` + 1, ... in the eight lanes.
 [[nodiscard]] inline PixelLanes counting_lanes(int first) {
     return PixelLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<std::int16_t>(first);
@@ -198,6 +204,16 @@ struct EightInts {
     return __builtin_ia32_minps(a, b);
 #else
     return a < b ? a : b;
+#endif
+}
+
+// Correctly rounded, as scalar roots are.
+[[nodiscard]] inline FourFloats roots_of(FourFloats v) {
+#if defined(__SSE2__)
+    return __builtin_ia32_sqrtps(v);
+#else
+    return FourFloats{__builtin_sqrtf(v[0]), __builtin_sqrtf(v[1]), __builtin_sqrtf(v[2]),
+                      __builtin_sqrtf(v[3])};
 #endif
 }
 

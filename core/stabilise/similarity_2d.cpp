@@ -5,6 +5,7 @@
 
 #include "core/base/check.hpp"
 #include "core/base/math.hpp"
+#include "core/base/ranked.hpp"
 
 namespace rig {
 
@@ -62,12 +63,6 @@ bool fit_weighted(std::span<const PlanarMarker> markers, const Weights& weights,
     return fit.a * fit.a + fit.b * fit.b > 0.0;
 }
 
-double median(std::span<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
 double distance_squared(const PlanarMarker& marker, const Similarity2d& fit) {
     const Vec2 e = marker.seen - fit.apply(marker.neutral);
     return e.dot(e);
@@ -81,7 +76,7 @@ void weigh(std::span<const PlanarMarker> markers, const Similarity2d& fit, const
     for (const PlanarMarker& marker : markers) {
         if (seen(marker)) distances[count++] = std::sqrt(distance_squared(marker, fit));
     }
-    const double typical = std::max(config.least_spread, median({distances.data(), count}));
+    const double typical = std::max(config.least_spread, median(std::span(distances).first(count)));
     const double reach2 = config.outlier_spreads * config.outlier_spreads * typical * typical;
     double total = 0.0;
     double sum = 0.0;

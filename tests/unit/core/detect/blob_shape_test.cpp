@@ -65,6 +65,22 @@ TEST(BlobShape, BlurIsTakenOffTheAxesAndNothingElse) {
     EXPECT_NEAR(without_blur(ring).xx, ring.xx - 0.5, 1e-9);
 }
 
+TEST(BlobShape, RowsOfAnEllipseHoldThePixelsInsideIt) {
+    constexpr double kX = 30.3, kY = 28.7, kXx = 20.0, kXy = 6.0, kYy = 9.0;
+    const EllipseRows rows(kX, kY, kXx, kXy, kYy, 2.0);
+    for (int y = 0; y < 64; ++y) {
+        std::uint64_t expected = 0;
+        for (int x = 0; x < 64; ++x) {
+            const double dx = x - kX;
+            const double dy = y - kY;
+            const double square =
+                (kYy * dx * dx - 2.0 * kXy * dx * dy + kXx * dy * dy) / (kXx * kYy - kXy * kXy);
+            if (square <= 4.0) expected |= std::uint64_t{1} << x;
+        }
+        EXPECT_EQ(rows.at(y), expected) << y;
+    }
+}
+
 TEST(BlobShape, ACleanDiscIsAMarker) {
     Blob blob = disc();
     judge_shape(1.5, {}, blob);
