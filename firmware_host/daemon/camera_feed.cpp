@@ -46,6 +46,7 @@ Result<FrameFormat, FrameError> CameraFeed::open() {
     running_ = format.has_value();
     last_usable_us_ = clock_.now_us();
     passed_exposure_ = 0;
+    counts_on_ = false;  // a camera counts anew from each start
     if (running_) {
         back_off_us_ = 0;
         set_status(CameraStatus::kMissing);
@@ -137,8 +138,8 @@ CameraFeed::Verdict CameraFeed::judge(const CameraFrame& frame) {
         raise(Fault::kLateFrame);
         return Verdict::kSkip;
     }
-    if (any_frame_ && frame.sequence - last_sequence_ != 1) raise(Fault::kSequenceGap);
-    any_frame_ = true;
+    if (counts_on_ && frame.sequence - last_sequence_ != 1) raise(Fault::kSequenceGap);
+    any_frame_ = counts_on_ = true;
     last_capture_us_ = frame.capture_us;
     last_sequence_ = frame.sequence;
     if (!is_frozen(frame)) return Verdict::kUse;

@@ -70,6 +70,7 @@ class CameraFeed {
     std::uint64_t passed_exposure_ = 0;
     bool running_ = false;
     bool any_frame_ = false;
+    bool counts_on_ = false;  // last_sequence_ is of this start
     std::int64_t last_capture_us_ = 0;
     std::uint32_t last_sequence_ = 0;
     std::int64_t last_usable_us_ = 0;

@@ -3,6 +3,7 @@
 #include <linux/videodev2.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 
@@ -113,6 +114,12 @@ Result<FrameFormat, FrameError> V4l2FrameSource::start() {
     const auto node = find_node();
     if (!node) return failure(node.error());
     const os::SystemResult opened = device_.open(node->device.c_str());
+    if (opened.error_number == ENOTTY) {
+        return failure(explain(FrameError::kRefused,
+                               "%s (%s) gives no pictures: it is an output, a second node of a camera, or a "
+                               "virtual camera that nobody plays into yet",
+                               node->device.c_str(), node->path.c_str()));
+    }
     if (!opened.done()) {
         return failure(explain(fault_of_call(opened),
                                "%s cannot be opened (error %d): another program has it, or the permission is "
