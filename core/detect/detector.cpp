@@ -20,14 +20,13 @@ constexpr int kLumaRows = 8;    // every so manieth row is enough for the mean
 constexpr int kCorePixels = 3;  // beyond one and a half thresholds
 constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
                                                            0.75};  // of a component's own range of grey
-constexpr double kFringe = 4.0;          // px by which blur and noise lengthen a component
-constexpr double kSizeMargin = 1.6;      // largest marker of an image / usual marker
-constexpr double kSettledQuality = 4.0;  // summed scores below which a settled polarity is doubted
-constexpr std::uint32_t kSparse = 2;     // boxes are that much larger than what is in them
-constexpr std::size_t kMostSecondLooks =
-    128;                          // of an image or its windows: texture like a beard has hundreds of pieces
-constexpr double kDimmest = 0.4;  // of the least contrast, in a dim image
+constexpr double kFringe = 4.0;           // px by which blur and noise lengthen a component
+constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual marker
+constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
+constexpr std::uint32_t kSparse = 2;      // boxes are that much larger than what is in them
+constexpr double kDimmest = 0.4;          // of the least contrast, in a dim image
 constexpr double kTriedSizes = 1.5;       // long components are no one marker
+constexpr double kLobedSizes = 1.3;       // so long is what a marker sticks out of, with it
 constexpr double kHopelessBadness = 1.5;  // score 0
 
 // Sixteen pixels of a row from x on; beyond the image, zeros.
@@ -262,6 +261,7 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     result.blobs.clear();
     result.report = DetectorReport{};
     result.second_looks = 0;
+    result.tiles = 0;
     w.failed.clear();
     const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
     const double largest = largest_marker(state_.usual_size_px);
@@ -314,6 +314,7 @@ void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResu
         Search inner = search;
         if (length_of(component) < kTriedSizes * usual) inner.usual_size_px = 0.0;
         split(inner, narrower ? 0 : 1, component, runs, result);
+        if (length_of(component) > kLobedSizes * usual) examine_lobes(inner, component, runs, result);
     }
 }
 
@@ -401,6 +402,8 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
         if (search.cuts_off(part)) continue;  // another window sees all of it, or nobody does
         if (!whole && examine(search, part, members, all, result)) continue;
         if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
+        if (length_of(part) > kLobedSizes * search.usual_size_px)
+            examine_lobes(search, part, members, result);
     }
 }
 
@@ -423,7 +426,8 @@ void Detector::drop_pieces(SideResult& result) {
             if (k == i ||
                 !(is_inside(whole, other.x_px, other.y_px) || is_inside(other, whole.x_px, whole.y_px)))
                 continue;
-            dropped[key(other) < key(whole) ? i : k] = true;
+            const bool worse = key(other) < key(whole) || (k < i && key(other) == key(whole));
+            dropped[worse ? i : k] = true;
         }
     }
     for (std::size_t i = 0; i < blobs.size(); ++i) {
@@ -490,9 +494,12 @@ void Detector::hand_on(const SideResult& result, Observations& observations, Det
     for (const Blob& blob : result.blobs) {
         if (blob.rejection != Rejection::kNone || blob.score < config_.min_score) continue;
         const auto score = static_cast<float>(blob.score);
-        const Observation seen{static_cast<float>(blob.x_px), static_cast<float>(blob.y_px),
+        const Observation seen{static_cast<float>(blob.x_px),
+                               static_cast<float>(blob.y_px),
                                static_cast<float>(blob.diameter_px),
-                               static_cast<float>(std::min(1.0, blob.contrast / 255.0)), score};
+                               static_cast<float>(std::min(1.0, blob.contrast / 255.0)),
+                               score,
+                               static_cast<float>(completed_sigma_px(blob))};
         if (score < least || !observations.push_back(seen)) {
             ++report.left_out;
             report.observations_full = true;

@@ -15,6 +15,8 @@ struct Direction {
 };
 
 constexpr double kStepPx = 1.0;              // to either side of the outline
+constexpr double kBeyond = 2.5;              // such steps outside it: skin, or shade on it
+constexpr double kLeastStep = 0.4;           // from the core to there, of the contrast
 constexpr double kC1 = 0.92387953251128674;  // cosines of a sixteenth and an eighth of a turn
 constexpr double kC2 = 0.70710678118654752;
 constexpr double kC3 = 0.38268343236508977;
@@ -43,6 +45,10 @@ double edge_slope(const ImageView& image, Side side, const Blob& blob) {
     const double root_xx = sqrt(blob.xx);
     const double root_xy = blob.xy / root_xx;
     const double root_yy = sqrt(determinant / blob.xx);
+    // Bright sides are measured inverted: what is above 255 less a level is as far above the core.
+    const double turn = side == Side::kBelow ? 1.0 : -1.0;
+    const double black = side == Side::kBelow ? 0.0 : 255.0;
+    const double core = blob.background - blob.contrast;
     std::array<float, 2 * kHalfTurn.size()> changes;
     std::size_t count = 0;
     for (const Direction& d : kHalfTurn) {
@@ -56,13 +62,15 @@ double edge_slope(const ImageView& image, Side side, const Blob& blob) {
         for (const double sign : {1.0, -1.0}) {
             const double out = level_at(image, blob.x_px + sign * (dx + nx), blob.y_px + sign * (dy + ny));
             const double in = level_at(image, blob.x_px + sign * (dx - nx), blob.y_px + sign * (dy - ny));
-            changes[count++] = static_cast<float>(out - in);
+            const double beyond = level_at(image, blob.x_px + sign * (dx + kBeyond * nx),
+                                           blob.y_px + sign * (dy + kBeyond * ny));
+            const double whole = std::max(kLeastStep * blob.contrast, turn * (beyond - black) - core);
+            changes[count++] = static_cast<float>(turn * (out - in) / whole);
         }
     }
     const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(count / 2);
     std::nth_element(changes.begin(), middle, changes.end());
-    const double change = static_cast<double>(*middle) / blob.contrast;
-    return side == Side::kBelow ? change : -change;
+    return static_cast<double>(*middle);
 }
 
 }  // namespace rig

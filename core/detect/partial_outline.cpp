@@ -37,7 +37,6 @@ constexpr double kInside = 0.8;                  // px within the ellipse where 
 constexpr double kOutside = 1.0;                 // and outside it where there should be none
 constexpr double kRimPx = 1.0;                   // what reaches so far out goes on beyond
 constexpr int kLeastPiece = 3;                   // pixels
-constexpr double kLeastFollowed = 0.6;
 constexpr double kLeastFilled = 0.5;
 
 using Points = BoundedVector<Point, kMaxPoints>;
@@ -170,6 +169,11 @@ double followed_part(std::span<const Point> points, const Conic& conic, const Po
     return static_cast<double>(ones(sectors)) / kSectors;
 }
 
+double long_axis_px(const Ellipse& e) {
+    const double half = 0.5 * (e.xx - e.yy);
+    return 4.0 * sqrt(0.5 * (e.xx + e.yy) + sqrt(half * half + e.xy * e.xy));
+}
+
 // Pixels of row y within the ellipse grown by `by` px, as a span of bits.
 std::uint64_t span_of(const Ellipse& e, int y, double by) {
     const double mean = sqrt(sqrt(std::max(1e-9, e.xx * e.yy - e.xy * e.xy)));  // half the mean radius
@@ -247,7 +251,7 @@ bool gather_pieces(double x, double y, double radius, int outline, BlobWorkspace
     return true;
 }
 
-bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
+bool follow_ellipse(const BlobWorkspace& w, int outline, const EllipseLimits& limits, Ellipse& ellipse) {
     Points points;
     gather_points(w, outline, points);
     if (points.size() < kMinPoints) return false;
@@ -257,20 +261,22 @@ bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
     origin.y /= static_cast<double>(points.size());
     for (Point& p : points) p.x -= origin.x, p.y -= origin.y;
     double best = 0.0;
+    const std::size_t last = limits.disturbed ? kDirections.size() : 0;
     // From all points, and then, unless those agree, without those on one side after the other.
-    for (std::size_t start = 0; start <= kDirections.size() && best < kAgreed; ++start) {
+    for (std::size_t start = 0; start <= last && best < kAgreed; ++start) {
         Points some = points;
         if (start > 0) leave_out(kDirections[start - 1], some);
         Conic conic{};
         Ellipse fitted;
         if (!fit_in_rounds(some.span(), points.span(), conic) || !ellipse_of(conic, origin, fitted)) continue;
+        if (long_axis_px(fitted) > limits.longest_px) continue;
         fitted.followed = followed_part(points.span(), conic, origin, fitted);
         const double quality = fitted.followed * filled_part(fitted, w);
         if (quality <= best) continue;
         best = quality;
         ellipse = fitted;
     }
-    return ellipse.followed >= kLeastFollowed && best > 0.0;
+    return ellipse.followed >= limits.least_followed && best > 0.0;
 }
 
 bool keep_ellipse(const Ellipse& ellipse, BlobWorkspace& w) {

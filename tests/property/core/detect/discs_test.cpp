@@ -210,6 +210,48 @@ TEST(Discs, CentresOnceEachMarkersOffsetIsLearnt) {
     }
 }
 
+// Errors of completed markers in units of what they say of themselves, to the picture's centroid.
+TEST(Discs, CompletedMarkersSayHowFarOffTheyMayBe) {
+    for (const std::uint64_t seeds : {kSeeds, kFresh}) {
+        double square = 0.0;
+        double square_px2 = 0.0;
+        double mean_sigma_px = 0.0;
+        std::size_t count = 0;
+        for (const Disturbance disturbance :
+             {Disturbance::kGlintsOnDiscs, Disturbance::kStreaks, Disturbance::kHighlights,
+              Disturbance::kLashes, Disturbance::kLipShadow, Disturbance::kEverything}) {
+            for (std::uint64_t k = 0; k < 12; ++k) {
+                const test::DiscSceneConfig config = scene(k, k % 2 == 1, disturbance, seeds);
+                const test::DiscPicture picture = test::render(config);
+                const Observations observations = observe(config, picture);
+                const auto truth = test::true_dots(picture);
+                for (std::size_t i = 0; i < truth.size(); ++i) {
+                    const test::DiscTruth& disc = picture.discs[i];
+                    const Observation* best = nearest_to(disc, truth[i].reach_px, observations);
+                    if (best == nullptr || best->sigma_px == 0.0F) continue;
+                    const double sigma_px = static_cast<double>(best->sigma_px);
+                    EXPECT_GE(sigma_px, kCentreSigmaPx - 1e-6);
+                    const double off_px = std::hypot(static_cast<double>(best->x_px) - disc.centroid_x_px,
+                                                     static_cast<double>(best->y_px) - disc.centroid_y_px);
+                    square += off_px * off_px / (sigma_px * sigma_px);
+                    square_px2 += off_px * off_px;
+                    mean_sigma_px += sigma_px;
+                    ++count;
+                }
+            }
+        }
+        const double ratio = std::sqrt(square / static_cast<double>(count));
+        std::printf(
+            "    %s seeds: %zu completed markers, rms %.2f px, mean sigma %.2f px, rms of error / sigma "
+            "%.2f\n",
+            seeds == kFresh ? "fresh" : "seen ", count, std::sqrt(square_px2 / static_cast<double>(count)),
+            mean_sigma_px / static_cast<double>(count), ratio);
+        EXPECT_GT(count, 100U);
+        EXPECT_GE(ratio, 0.5);
+        EXPECT_LE(ratio, 2.0);
+    }
+}
+
 struct Bounds {
     double least_recall;
     double least_precision;
