@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/detect/bit_rows.hpp"
 #include "core/image/kernels.hpp"
 
 namespace rig {
@@ -65,5 +66,10 @@ struct ComponentCounts {
 // below the least area are counted and left out, so that noise cannot fill the table.
 ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits,
                         const ComponentStorage& storage);
+
+// A set of bits, a window's whose corner is (left, top), as a component in pixels of the image; its runs go
+// to `runs`. False: no room.
+[[nodiscard]] bool component_of(const BitRows& rows, int height, int left, int top, std::span<Run> runs,
+                                Component& component);
 
 }  // namespace rig

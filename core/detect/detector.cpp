@@ -19,16 +19,14 @@ namespace {
 constexpr int kBlock = static_cast<int>(kBlockPx);
 constexpr int kLumaRows = 8;    // every so manieth row is enough for the mean
 constexpr int kCorePixels = 3;  // beyond one and a half thresholds
-constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
-                                                           0.75};  // of a component's own range of grey
-constexpr double kFringe = 4.0;          // px by which blur and noise lengthen a component
-constexpr double kSizeMargin = 1.6;      // largest marker of an image / usual marker
-constexpr double kSettledQuality = 4.0;  // summed scores below which a settled polarity is doubted
-constexpr std::uint32_t kSparse = 2;     // boxes are that much larger than what is in them
-constexpr std::size_t kMostSecondLooks =
-    128;                          // of an image or its windows: texture like a beard has hundreds of pieces
-constexpr double kDimmest = 0.4;  // of the least contrast, in a dim image
+constexpr std::array<double, kSplitLevels> kSplitDepths{0.0, 0.5, 0.75};  // of a component's own range
+constexpr double kFringe = 4.0;           // px by which blur and noise lengthen a component
+constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual marker
+constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
+constexpr std::uint32_t kSparse = 2;      // boxes are that much larger than what is in them
+constexpr double kDimmest = 0.4;          // of the least contrast, in a dim image
 constexpr double kTriedSizes = 1.5;       // long components are no one marker
+constexpr double kLobedSizes = 1.3;       // so long is what a marker sticks out of, with it
 constexpr double kHopelessBadness = 1.5;  // score 0
 constexpr double kLittlePart =
     0.3;  // of a usual size's square, some 0.4 of a marker seen from the front; and one
@@ -278,6 +276,7 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     result.blobs.clear();
     result.report = DetectorReport{};
     result.second_looks = 0;
+    result.tiles = 0;
     w.failed.clear();
     const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
     const double largest = largest_marker(state_.usual_size_px);
@@ -337,6 +336,7 @@ void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResu
         Search inner = search;
         if (length_of(component) < kTriedSizes * usual) inner.usual_size_px = 0.0;
         split(inner, narrower ? 0 : 1, component, runs, result);
+        if (length_of(component) > kLobedSizes * usual) examine_lobes(inner, component, runs, result);
     }
 }
 
@@ -426,6 +426,8 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
         if (little && counts.components > kFewParts && !is_apart(part, members, all)) continue;
         if (!whole && examine(search, part, members, all, result)) continue;
         if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
+        if (length_of(part) > kLobedSizes * search.usual_size_px)
+            examine_lobes(search, part, members, result);
     }
 }
 
@@ -448,7 +450,8 @@ void Detector::drop_pieces(SideResult& result) {
             if (k == i ||
                 !(is_inside(whole, other.x_px, other.y_px) || is_inside(other, whole.x_px, whole.y_px)))
                 continue;
-            dropped[key(other) < key(whole) ? i : k] = true;
+            const bool worse = key(other) < key(whole) || (k < i && key(other) == key(whole));
+            dropped[worse ? i : k] = true;
         }
     }
     for (std::size_t i = 0; i < blobs.size(); ++i) {
@@ -515,9 +518,12 @@ void Detector::hand_on(const SideResult& result, Observations& observations, Det
     for (const Blob& blob : result.blobs) {
         if (blob.rejection != Rejection::kNone || blob.score < config_.min_score) continue;
         const auto score = static_cast<float>(blob.score);
-        const Observation seen{static_cast<float>(blob.x_px), static_cast<float>(blob.y_px),
+        const Observation seen{static_cast<float>(blob.x_px),
+                               static_cast<float>(blob.y_px),
                                static_cast<float>(blob.diameter_px),
-                               static_cast<float>(std::min(1.0, blob.contrast / 255.0)), score};
+                               static_cast<float>(std::min(1.0, blob.contrast / 255.0)),
+                               score,
+                               static_cast<float>(completed_sigma_px(blob))};
         if (score < least || !observations.push_back(seen)) {
             ++report.left_out;
             report.observations_full = true;

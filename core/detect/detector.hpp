@@ -80,6 +80,11 @@ inline constexpr float kMaxReachPx =
     24.0F;  // an expected marker farther away than that is searched for in vain
 inline constexpr double kWindowShare = 0.75;
 
+// Blobs of an image or its windows that are looked at again for pieces or for a part of an outline: texture
+// like a beard has hundreds of pieces.
+inline constexpr std::size_t kMostSecondLooks = 128;
+inline constexpr std::size_t kMaxLobeRuns = kBlobWindowPx * (kBlobWindowPx / 2 + 1);
+
 // How often a blob that is no marker is cut again.
 inline constexpr std::size_t kSplitLevels = 3;
 
@@ -154,6 +159,7 @@ class Detector {
         double quality = 0.0;
         double usual_size_px = 0.0;  // long axis; 0 when the markers are too few
         double usual_depth = 0.0;
+        std::size_t tiles = 0;         // that were searched for lobes
         std::size_t second_looks = 0;  // blobs whose pieces or outline may have been completed
     };
 
@@ -180,6 +186,7 @@ class Detector {
         BitRows window{};                                     // beyond the threshold, not examined yet
         BitRows reach{};
         BitRows part{};
+        std::array<Run, kMaxLobeRuns> lobe_runs{};  // of a lobe and of the rest of its tile
         BlobWorkspace blob;
         QuickWorkspace quick;
         std::array<SideResult, 2> sides;
@@ -212,6 +219,11 @@ class Detector {
     [[nodiscard]] bool examine(const Search& search, const Component& component, std::span<const Run> runs,
                                const Siblings& siblings, SideResult& result);
     void set_core_steps(Side side);
+    void examine_lobes(const Search& search, const Component& component, std::span<const Run> runs,
+                       SideResult& result);
+    void examine_tile(const Search& search, std::span<const Run> runs, int left, int top, int overlap,
+                      SideResult& result);
+    void examine_lobe(const Search& search, const std::array<Component, 2>& lobe, SideResult& result);
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
     void apply_population(const ImageView& image, Side side, SideResult& result) const;
     [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);
