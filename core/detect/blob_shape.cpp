@@ -35,7 +35,7 @@ struct Least {
     double retro_depth;
 };
 constexpr Least kLeastOfPiece{0.45, 0.25};
-constexpr Least kLeastOfLobe{0.6, 0.5};
+constexpr Least kLeastOfLobe{0.7, 0.5};
 
 }  // namespace
 

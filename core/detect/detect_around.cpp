@@ -114,13 +114,15 @@ bool Detector::search_window(const ImageView& image, Side side, const ExpectedMa
                         .bottom = window.bottom};
     const std::size_t before = result.blobs.size();
     if (!examine_window(search, expected, result)) return false;
-    const bool found = std::any_of(result.blobs.begin(), result.blobs.end(), [&](const Blob& blob) {
-        return is_within_reach(blob.x_px, blob.y_px, expected);
-    });
-    if (found) drop_cut_off(search);
+    if (is_met(expected, result)) drop_cut_off(search);
     split_failed(search, means, result);
     drop_repeats(before, result);
     return true;
+}
+
+bool Detector::is_met(const ExpectedMarker& expected, const SideResult& result) {
+    return std::any_of(result.blobs.begin(), result.blobs.end(),
+                       [&](const Blob& blob) { return is_within_reach(blob.x_px, blob.y_px, expected); });
 }
 
 // What only reaches into the window is left to the window it belongs to, unless the marker may be in it.

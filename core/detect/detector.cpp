@@ -26,7 +26,8 @@ constexpr double kSettledQuality = 4.0;   // summed scores below which a settled
 constexpr std::uint32_t kSparse = 2;      // boxes are that much larger than what is in them
 constexpr double kDimmest = 0.4;          // of the least contrast, in a dim image
 constexpr double kTriedSizes = 1.5;       // long components are no one marker
-constexpr double kLobedSizes = 1.3;       // so long is what a marker sticks out of, with it
+constexpr double kLobedSizes = 24.0;      // so long at most is what a marker sticks out of, with it; and
+constexpr double kLobedPartSizes = 5.0;   // a part at a deeper level
 constexpr double kHopelessBadness = 1.5;  // score 0
 constexpr double kLittlePart =
     0.3;  // of a usual size's square, some 0.4 of a marker seen from the front; and one
@@ -336,7 +337,7 @@ void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResu
         Search inner = search;
         if (length_of(component) < kTriedSizes * usual) inner.usual_size_px = 0.0;
         split(inner, narrower ? 0 : 1, component, runs, result);
-        if (length_of(component) > kLobedSizes * usual) examine_lobes(inner, component, runs, result);
+        examine_lobes(inner, component, runs, kLobedSizes, result);
     }
 }
 
@@ -426,8 +427,7 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
         if (little && counts.components > kFewParts && !is_apart(part, members, all)) continue;
         if (!whole && examine(search, part, members, all, result)) continue;
         if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
-        if (length_of(part) > kLobedSizes * search.usual_size_px)
-            examine_lobes(search, part, members, result);
+        examine_lobes(search, part, members, level == 0 ? kLobedSizes : kLobedPartSizes, result);
     }
 }
 

@@ -11,6 +11,7 @@
 #include "core/base/faults.hpp"
 #include "core/base/result.hpp"
 #include "core/detect/blob.hpp"
+#include "core/detect/lobes.hpp"
 #include "core/detect/observation.hpp"
 #include "core/detect/population.hpp"
 #include "core/detect/quick_blob.hpp"
@@ -110,9 +111,10 @@ class Detector {
         const ImageView& image;
         const BlockGrid& thresholds;
         Side side = Side::kBelow;
-        double largest_px = 0.0;           // longest marker
-        double usual_size_px = 0.0;        // long axis of the image's markers; 0: unknown,
-        double usual_depth = 0.0;          // of their depths; 0: unknown
+        double largest_px = 0.0;                   // longest marker
+        double usual_size_px = 0.0;                // long axis of the image's markers; 0: unknown,
+        double usual_depth = 0.0;                  // of their depths; 0: unknown
+        const ExpectedMarker* expected = nullptr;  // the marker that a window is for
         bool first_look = false;           // the markers' size is not known yet: odd blobs get another look
         std::uint32_t little_area_px = 0;  // of a part among several, below which it must stand clear
         int left = 0;                      // px: what is looked at, and where the thresholds' grid begins
@@ -220,10 +222,12 @@ class Detector {
                                const Siblings& siblings, SideResult& result);
     void set_core_steps(Side side);
     void examine_lobes(const Search& search, const Component& component, std::span<const Run> runs,
-                       SideResult& result);
-    void examine_tile(const Search& search, std::span<const Run> runs, int left, int top, int overlap,
+                       double most_sizes, SideResult& result);
+    void examine_tile(const Search& search, std::span<const Run> runs, const RunEnds& ends,
+                      const BitBox& tile, const BitBox& own, SideResult& result);
+    void examine_lobe(const Search& search, const BitRows& area, const BitRows& lobe, const BitBox& tile,
                       SideResult& result);
-    void examine_lobe(const Search& search, const std::array<Component, 2>& lobe, SideResult& result);
+    [[nodiscard]] static bool is_met(const ExpectedMarker& expected, const SideResult& result);
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
     void apply_population(const ImageView& image, Side side, SideResult& result) const;
     [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);

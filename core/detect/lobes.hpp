@@ -13,6 +13,14 @@ namespace rig {
 inline constexpr std::size_t kMaxLobes = 8;  // of one window
 using Lobes = BoundedVector<BitRows, kMaxLobes>;
 
+// Where a run of a component ends at something like a marker's rim.
+struct RunEnd {
+    int x = 0;
+    int y = 0;
+};
+inline constexpr std::size_t kMaxRunEnds = 256;  // of a component
+using RunEnds = BoundedVector<RunEnd, kMaxRunEnds>;
+
 // Parts of `area` (width x height pixels of a window) that could be of a marker `size_px` long: neither wider
 // nor longer than one, none that reaches the window's border. What is beyond the window counts as area.
 void find_lobes(const BitRows& area, int width, int height, double size_px, Lobes& lobes);
