@@ -18,12 +18,11 @@ constexpr double kLeastArea = 0.25;      // of it, in squares of sizes
 constexpr double kLeastLobed = 2.2;      // of what it sticks out of, with it: its length in sizes
 constexpr double kLeastLobedArea = 1.0;  // in squares of them
 constexpr double kLeastLobeEnds = 0.9;
-constexpr double kLeastEnds = 1.2;      // of runs, in sizes, where the image falls off as at a marker's rim:
-constexpr double kLeastEndDepth = 0.8;  // in least depths of a lobe,
-constexpr int kIntoPx = 3;              // from so far inside
-constexpr int kBeyondPx = 2;            // to so far outside
-constexpr double kLeastInkDepth = 0.7;
-constexpr double kLeastRetroDepth = 0.5;
+constexpr double kLeastEnds = 1.2;  // of runs, in sizes, where the image falls off as at a marker's rim:
+constexpr int kIntoPx = 3;          // from so far inside
+constexpr int kBeyondPx = 2;        // to so far outside
+constexpr double kLeastInkDepth = 0.74;
+constexpr double kLeastRetroDepth = 0.45;
 constexpr int kTile = static_cast<int>(kBlobWindowPx);
 constexpr std::size_t kMostTiles = 400;  // of an image or one of its windows: hair is as large as the image
 
@@ -51,34 +50,36 @@ int steps_of(double radius_px) {
     return static_cast<int>(radius_px + 0.5);
 }
 
-// Hands the connected pieces of `rest` on that are short enough; the longer ones remain in it.
-void gather_short(BitRows& rest, int width, int height, double size_px, Lobes& lobes) {
-    BitRows longer{};
+// Hands the connected pieces of `rest` on that have a mark and are short enough; the longer ones remain in
+// it.
+void gather_short(BitRows& rest, const BitRows& marks, int width, int height, double size_px, Lobes& lobes) {
+    BitRows longer;
     const auto bottom = static_cast<std::size_t>(height);
+    std::fill_n(longer.begin(), bottom, std::uint64_t{0});
     for (std::size_t y = 0; y < bottom; ++y) {
-        while (rest[y] != 0) {
+        for (std::uint64_t left = 0; (left = rest[y] & marks[y]) != 0;) {
             BitRows piece{};
-            piece[y] = rest[y] & (~rest[y] + 1);
+            piece[y] = left & (~left + 1);
             flood(piece, rest, height);
-            for (std::size_t k = y; k < bottom; ++k) rest[k] &= ~piece[k];
-            const BitBox box = box_of(piece, static_cast<int>(y), height);
+            for (std::size_t k = 0; k < bottom; ++k) rest[k] &= ~piece[k];
+            const BitBox box = box_of(piece, 0, height);
             if (count_bits(piece, box.top, box.bottom) < kLeastArea * size_px * size_px) continue;
             const bool cut = box.left == 0 || box.top == 0 || box.right == width || box.bottom == height;
             const double length = std::max(box.right - box.left, box.bottom - box.top);
             if (length > kLongest * size_px) {
-                for (std::size_t k = y; k < bottom; ++k) longer[k] |= piece[k];
+                for (std::size_t k = 0; k < bottom; ++k) longer[k] |= piece[k];
             } else if (!cut && !lobes.push_back(piece)) {
                 return;
             }
         }
     }
-    rest = longer;
+    copy_rows(longer, height, rest);
 }
 
 // Finds ends of runs at which the image falls off as at a marker's rim: beyond it is skin.
 void find_steep_ends(const Detector::Search& search, std::span<const Run> runs, RunEnds& ends) {
     const bool dark = search.side == Side::kBelow;
-    const double depth = kLeastEndDepth * (dark ? kLeastInkDepth : kLeastRetroDepth) * search.usual_depth;
+    const double depth = (dark ? kLeastInkDepth : kLeastRetroDepth) * search.usual_depth;
     const int part = static_cast<int>(256.0 * (dark ? 1.0 - depth : 1.0 + depth));
     ends.clear();
     for (const Run& run : runs) {
@@ -104,6 +105,19 @@ int count_in(const RunEnds& ends, const BitBox& box) {
         std::count_if(ends.begin(), ends.end(), [&](const RunEnd& end) { return is_in(box, end.x, end.y); }));
 }
 
+void drop_out_of_reach(const ExpectedMarker& expected, double size_px, RunEnds& ends) {
+    const auto x = static_cast<double>(expected.x_px);
+    const auto y = static_cast<double>(expected.y_px);
+    const double reach = static_cast<double>(std::min(expected.reach_px, kMaxReachPx)) + 0.6 * size_px;
+    const BitBox box{static_cast<int>(x - reach), static_cast<int>(y - reach),
+                     static_cast<int>(x + reach) + 1, static_cast<int>(y + reach) + 1};
+    std::size_t kept = 0;
+    for (const RunEnd& end : ends) {
+        if (is_in(box, end.x, end.y)) ends[kept++] = end;
+    }
+    ends.resize(kept);
+}
+
 // Leaves those that are not of a marker that nothing is wrong with.
 void drop_explained(std::span<const Blob> blobs, const BitBox& box, RunEnds& ends) {
     for (const Blob& blob : blobs) {
@@ -122,17 +136,18 @@ void drop_explained(std::span<const Blob> blobs, const BitBox& box, RunEnds& end
 
 }  // namespace
 
-void find_lobes(const BitRows& area, int width, int height, double size_px, Lobes& lobes) {
+void find_lobes(const BitRows& area, const BitRows& marks, int width, int height, double size_px,
+                Lobes& lobes) {
     lobes.clear();
-    BitRows opened{};
-    BitRows rest{};
+    const auto bottom = static_cast<std::size_t>(height);
+    BitRows opened;
+    BitRows rest;
     open(area, steps_of(kWideRadius * size_px), 0, width, height, opened);
-    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) rest[y] = area[y] & ~opened[y];
-    gather_short(rest, width, height, size_px, lobes);
-    const int thin = steps_of(kThinRadius * size_px);
-    open(rest, thin, 0, width, height, opened);
-    for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) rest[y] &= opened[y];
-    gather_short(rest, width, height, size_px, lobes);
+    for (std::size_t y = 0; y < bottom; ++y) rest[y] = area[y] & ~opened[y];
+    gather_short(rest, marks, width, height, size_px, lobes);
+    open(rest, steps_of(kThinRadius * size_px), 0, width, height, opened);
+    for (std::size_t y = 0; y < bottom; ++y) rest[y] &= opened[y];
+    gather_short(rest, marks, width, height, size_px, lobes);
 }
 
 // In tiles that overlap by more than a lobe is long; each lobe belongs to the tile that has its middle.
@@ -152,6 +167,7 @@ void Detector::examine_lobes(const Search& search, const Component& component, s
     find_steep_ends(search, runs, ends);
     const int least_ends = static_cast<int>(kLeastEnds * size);
     if (static_cast<int>(ends.size()) < least_ends) return;
+    if (search.expected != nullptr) drop_out_of_reach(*search.expected, size, ends);
     drop_explained(result.blobs.span(), box, ends);
     if (static_cast<int>(ends.size()) < least_ends) return;
     const int reach = std::min(kTile / 2 - 8, static_cast<int>(kLongest * size) + 2);
@@ -190,8 +206,14 @@ void Detector::examine_tile(const Search& search, std::span<const Run> runs, con
     }
     if (marked < kLeastArea * size * size || marked == width * height || result.tiles == kMostTiles) return;
     ++result.tiles;
+    BitRows marks{};
+    for (const RunEnd& end : ends) {
+        if (is_in(tile, end.x, end.y)) {
+            marks[static_cast<std::size_t>(end.y - tile.top)] |= std::uint64_t{1} << (end.x - tile.left);
+        }
+    }
     Lobes lobes;
-    find_lobes(area, width, height, size, lobes);
+    find_lobes(area, marks, width, height, size, lobes);
     for (const BitRows& lobe : lobes) {
         const BitBox box = box_of(lobe, 0, height);
         const int x = tile.left + (box.left + box.right) / 2;

@@ -21,8 +21,10 @@ struct RunEnd {
 inline constexpr std::size_t kMaxRunEnds = 256;  // of a component
 using RunEnds = BoundedVector<RunEnd, kMaxRunEnds>;
 
-// Parts of `area` (width x height pixels of a window) that could be of a marker `size_px` long: neither wider
-// nor longer than one, none that reaches the window's border. What is beyond the window counts as area.
-void find_lobes(const BitRows& area, int width, int height, double size_px, Lobes& lobes);
+// Parts of `area` (width x height pixels of a window) that could be of a marker `size_px` long and hold one
+// of `marks`: neither wider nor longer than one, none that reaches the window's border. What is beyond the
+// window counts as area.
+void find_lobes(const BitRows& area, const BitRows& marks, int width, int height, double size_px,
+                Lobes& lobes);
 
 }  // namespace rig

@@ -26,6 +26,8 @@ BitRows draw(Inside inside) {
     return rows;
 }
 
+const BitRows everywhere = draw([](int, int) { return true; });
+
 bool in_disc(double x, double y, double centre_x, double centre_y, double radius) {
     return std::hypot(x - centre_x, y - centre_y) <= radius;
 }
@@ -33,27 +35,39 @@ bool in_disc(double x, double y, double centre_x, double centre_y, double radius
 TEST(Lobes, ADiscAtAWideAreaOrAtALineIsOne) {
     Lobes lobes;
     const auto wide = [](int x, int y) { return y < 24 || in_disc(x, y, 30.0, 26.0, 4.5); };
-    find_lobes(draw(wide), 64, 64, kSize, lobes);
+    find_lobes(draw(wide), everywhere, 64, 64, kSize, lobes);
     ASSERT_EQ(lobes.size(), 1U);
     EXPECT_NE(lobes[0][28] >> 30 & 1U, 0U);
     EXPECT_EQ(lobes[0][20], 0U);
     const auto line = [](int x, int y) { return (y > 33 && y < 37) || in_disc(x, y, 30.0, 31.0, 4.5); };
-    find_lobes(draw(line), 64, 64, kSize, lobes);
+    find_lobes(draw(line), everywhere, 64, 64, kSize, lobes);
     ASSERT_EQ(lobes.size(), 1U);
     EXPECT_NE(lobes[0][30] >> 30 & 1U, 0U);
     EXPECT_EQ(lobes[0][35] >> 8 & 1U, 0U);
 }
 
+TEST(Lobes, OneWithoutAMarkIsNone) {
+    Lobes lobes;
+    const BitRows area = draw([](int x, int y) {
+        return y < 24 || in_disc(x, y, 18.0, 26.0, 4.5) || in_disc(x, y, 44.0, 26.0, 4.5);
+    });
+    find_lobes(area, everywhere, 64, 64, kSize, lobes);
+    EXPECT_EQ(lobes.size(), 2U);
+    find_lobes(area, draw([](int x, int y) { return x == 44 && y == 29; }), 64, 64, kSize, lobes);
+    ASSERT_EQ(lobes.size(), 1U);
+    EXPECT_NE(lobes[0][28] >> 44 & 1U, 0U);
+}
+
 TEST(Lobes, AreasLinesAndWhatTheWindowCutsAreNone) {
     Lobes lobes;
-    find_lobes(draw([](int, int y) { return y < 24; }), 64, 64, kSize, lobes);
+    find_lobes(draw([](int, int y) { return y < 24; }), everywhere, 64, 64, kSize, lobes);
     EXPECT_TRUE(lobes.empty());
-    find_lobes(draw([](int, int y) { return y > 33 && y < 37; }), 64, 64, kSize, lobes);
+    find_lobes(draw([](int, int y) { return y > 33 && y < 37; }), everywhere, 64, 64, kSize, lobes);
     EXPECT_TRUE(lobes.empty());
-    find_lobes(draw([](int x, int y) { return y < 24 || in_disc(x, y, 62.0, 26.0, 4.5); }), 64, 64, kSize,
-               lobes);
+    find_lobes(draw([](int x, int y) { return y < 24 || in_disc(x, y, 62.0, 26.0, 4.5); }), everywhere, 64,
+               64, kSize, lobes);
     EXPECT_TRUE(lobes.empty());
-    find_lobes({}, 64, 64, kSize, lobes);
+    find_lobes({}, everywhere, 64, 64, kSize, lobes);
     EXPECT_TRUE(lobes.empty());
 }
 
