@@ -27,6 +27,19 @@ struct Component {
     return grouped.subspan(component.first, component.count);
 }
 
+// Of its box, px.
+[[nodiscard]] inline int length_of(const Component& component) {
+    return std::max(component.right - component.left, component.bottom - component.top) + 1;
+}
+
+// Whether the middle of its box is part of it.
+[[nodiscard]] inline bool holds_its_middle(const Component& component, std::span<const Run> runs) {
+    const int x = (component.left + component.right + 1) / 2;
+    const int y = (component.top + component.bottom + 1) / 2;
+    return std::any_of(runs.begin(), runs.end(),
+                       [&](const Run& run) { return run.y == y && run.begin <= x && x < run.end; });
+}
+
 // Bounds and count of a component with one more run; runs come in raster order.
 inline void widen(Component& component, const Run& run) {
     component.left = std::min(component.left, run.begin);

@@ -28,6 +28,8 @@ constexpr double kDimmest = 0.4;          // of the least contrast, in a dim ima
 constexpr double kTriedSizes = 1.5;       // long components are no one marker
 constexpr double kLobedSizes = 24.0;      // so long at most is what a marker sticks out of, with it; and
 constexpr double kLobedPartSizes = 5.0;   // a part at a deeper level
+constexpr double kLineSizes = 1.35;       // so long is a line, and so thin
+constexpr double kLineAspect = 3.3;       // length^2 / area; a disc: 1.3
 constexpr double kHopelessBadness = 1.5;  // score 0
 constexpr double kLittlePart =
     0.3;  // of a usual size's square, some 0.4 of a marker seen from the front; and one
@@ -128,16 +130,11 @@ std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span
     });
 }
 
-int length_of(const Component& component) {
-    return std::max(component.right - component.left, component.bottom - component.top) + 1;
-}
-
-// Whether the middle of a component's box is part of it.
-bool holds_its_middle(const Component& component, std::span<const Run> runs) {
-    const int x = (component.left + component.right + 1) / 2;
-    const int y = (component.top + component.bottom + 1) / 2;
-    return std::any_of(runs.begin(), runs.end(),
-                       [&](const Run& run) { return run.y == y && run.begin <= x && x < run.end; });
+// Longer than a marker and thinner than one seen aslant, as an ellipse of its length and area.
+bool is_line(const Component& component, double usual_size_px) {
+    const double length = length_of(component);
+    return usual_size_px > 0.0 && length > kLineSizes * usual_size_px &&
+           length * length > kLineAspect * component.area_px;
 }
 
 // Whether no other part of the same larger component reaches into the window around this one; crumbs of
@@ -374,6 +371,7 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         reject(Rejection::kLarge);
         return false;
     }
+    if (is_line(component, search.usual_size_px)) return reject(Rejection::kElongated), false;
     BlobLimits limits = config_.blob;
     limits.usual_size_px = result.second_looks < kMostSecondLooks ? search.usual_size_px : 0.0;
     limits.usual_depth = search.usual_depth;
@@ -422,11 +420,12 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
         const Component& part = storage.components[c];
         const std::span<const Run> members = members_of(part, storage.grouped);
         if (search.cuts_off(part)) continue;  // another window sees all of it, or nobody does
-        // One little part among several of something larger is texture, unless it is clear of the others.
+        // One little part among several is texture, unless it is clear of the others.
         const bool little = part.area_px < search.little_area_px;
         if (little && counts.components > kFewParts && !is_apart(part, members, all)) continue;
         if (!whole && examine(search, part, members, all, result)) continue;
-        if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
+        const bool crumb = little && search.usual_size_px > 0.0;
+        if (level + 1 < kSplitLevels && !crumb) split(search, level + 1, part, members, result);
         examine_lobes(search, part, members, level == 0 ? kLobedSizes : kLobedPartSizes, result);
     }
 }

@@ -154,7 +154,7 @@ void find_lobes(const BitRows& area, const BitRows& marks, int width, int height
 void Detector::examine_lobes(const Search& search, const Component& component, std::span<const Run> runs,
                              double most_sizes, SideResult& result) {
     const double size = search.usual_size_px;
-    const int length = std::max(component.right - component.left, component.bottom - component.top) + 1;
+    const int length = length_of(component);
     if (length < kLeastLobed * size || length > most_sizes * size ||
         component.area_px < kLeastLobedArea * size * size ||
         (search.expected != nullptr && is_met(*search.expected, result))) {
