@@ -31,6 +31,8 @@ constexpr int kMinRing = 12;          // pixels that can carry a plane
 constexpr double kPartBadness = 0.5;  // of a marker none of whose rim is seen
 constexpr double kLeastSize = 0.7;    // of a completed marker, in usual ones
 constexpr double kMostSize = 1.35;
+constexpr double kLeastFollowed = 0.6;  // part of the rim of a completed marker that is seen
+constexpr double kLobeFollowed = 0.5;
 constexpr double kMostFollowedOpen = 0.15;  // of a blob whose outline is followed
 constexpr double kLineAspect = 3.5;         // of what is longer than a marker
 constexpr double kPieceReach = 1.1;         // of it, from a piece's middle
@@ -388,7 +390,11 @@ void measure_outline(const ImageView& image, const PlaneFit& fit, int outline, c
     draw_moat(w.blob, w.width, w.height, w.moat);
     blob.hidden = mark_hidden(w, fit.rms / blob.contrast, w.hidden);
     SoftMoments moments = soft_moments(w, outline);
-    if (blob.hidden) moments = complete_moments(moments, w.hidden, w.height);
+    if (blob.hidden) {
+        const double seen = moments.weight;
+        moments = complete_moments(moments, w.hidden, w.height);
+        blob.filled_in = 1.0 - seen / std::max(seen, moments.weight);
+    }
     if (moments.weight <= 0.0) {
         blob.rejection = Rejection::kSmall;
         return;
@@ -442,16 +448,23 @@ class Drawn {
 void complete_outline(const ImageView& image, const PlaneFit& fit, const BlobLimits& limits, bool of_pieces,
                       BlobWorkspace& w, Blob& blob) {
     Ellipse ellipse;
-    if (!follow_ellipse(w, kHalf, ellipse) || !keep_ellipse(ellipse, w)) return;
+    const EllipseLimits wanted{.longest_px = kMostSize * limits.usual_size_px,
+                               .least_followed = limits.is_lobe ? kLobeFollowed : kLeastFollowed,
+                               .disturbed = !limits.is_lobe};
+    if (!follow_ellipse(w, kHalf, wanted, ellipse) || !keep_ellipse(ellipse, w)) return;
     w.box = box_of(w.blob, 0, w.height);
     if (touches_border(image, w)) return;
     draw_moat(w.blob, w.width, w.height, w.moat);
+    if (limits.is_lobe) {
+        for (std::size_t y = 0; y < static_cast<std::size_t>(w.height); ++y) w.moat[y] &= ~w.foreign[y];
+    }
     const SoftMoments seen = soft_moments(w, kHalf);
     const SoftMoments moments = fill_moments(
         seen, {1.0, ellipse.x, ellipse.y, ellipse.xx, ellipse.xy, ellipse.yy}, w.hidden, w.height);
     if (moments.weight <= 0.0) return;
     Blob whole = blob;
     whole.completed = true;
+    whole.filled_in = 1.0 - seen.weight / std::max(seen.weight, moments.weight);
     set_axes(moments, w.left, w.top, whole);
     whole.deviation = outline_deviation_px(w, moments, mean_radius_px(whole));
     whole.open = open_part(w);
@@ -505,10 +518,10 @@ Blob measure_blob(const ImageView& image, Side side, const Component& component,
             std::fill_n(w.blob.begin(), w.height, std::uint64_t{0});
             join_pieces(image, side, fit, limits, 0.5 * (component.left + component.right) - w.left,
                         0.5 * (component.top + component.bottom) - w.top, w, blob);
-        } else if (is_piece(limits, blob)) {
+        } else if (!limits.is_lobe && is_piece(limits, blob)) {
             join_pieces(image, side, fit, limits, blob.x_px - w.left, blob.y_px - w.top, w, blob);
         }
-        if (!several && !blob.completed && has_odd_outline(limits, blob)) {
+        if (!several && !blob.completed && (limits.is_lobe || has_odd_outline(limits, blob))) {
             compute_cover(w, side, fit.plane, blob.contrast, kRedrawReach + kMoatReach);
             const Drawn own(w);
             complete_outline(image, fit, limits, false, w, blob);

@@ -39,6 +39,7 @@ struct BlobLimits {
     double max_open = 0.22;          // part of the moat that is not background
     double usual_size_px = 0.0;      // long axis of the image's markers; 0: unknown, nothing is completed
     double usual_depth = 0.0;        // of their depths
+    bool is_lobe = false;            // sticks out of something larger, its sibling
 };
 
 // The least pixels a disc of the least diameter shows above mid contrast, with a margin for blur.
@@ -58,6 +59,7 @@ struct Blob {
     double yy = 0.0;
     bool hidden = false;     // something that is neither paint nor skin lies on it
     bool completed = false;  // from a part of its outline
+    double filled_in = 0.0;  // part of its weight that was not seen
     double contrast = 0.0;   // grey levels between blob and background
     double snr = 0.0;        // contrast / rms of the surroundings about their plane, of a grey level at least
     double background = 0.0;  // grey level at the centre

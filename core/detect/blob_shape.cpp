@@ -10,15 +10,32 @@ namespace {
 
 constexpr double kMostBlurPx2 = 0.5;    // an edge some 3 px wide; more is shape and no blur
 constexpr double kAspectBadness = 0.3;  // of the flattest disc
-constexpr double kNoiseDeviationPx =
-    2.2;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
-constexpr double kSureSnr = 5.0;   // contrast / spread of the surroundings: less costs
+// What surroundings as smooth as the sensor allows, and rougher ones, do to a blob.
+struct Roughness {
+    double deviation_px;  // roughness of an outline whose edge is some 2 px wide, per noise / contrast
+    double sure_snr;      // contrast / spread of the surroundings: less costs
+};
+constexpr double kSensorNoise = 2.5;  // grey levels; more is not the sensor's
+constexpr Roughness kSmooth{2.8, 4.0};
+constexpr Roughness kRough{2.2, 5.0};
 constexpr double kLeastSnr = 2.5;  // below: no telling it from noise
 
-constexpr double kMostShadowed = 2.0;    // badness of a marker that shows at the deep outline
-constexpr double kLongest = 1.7;         // of what a part of one may be in
-constexpr double kLeastInkDepth = 0.45;  // of it, in usual depths
-constexpr double kLeastRetroDepth = 0.25;
+constexpr double kMostShadowed = 2.0;  // badness of a marker that shows at the deep outline
+constexpr double kLongest = 1.7;       // of what a part of one may be in
+constexpr double kWholeSigmaPx = 0.15;
+constexpr double kSigmaPerFilledPx = 1.5;  // all of its weight filled in
+constexpr double kFitSigmaPx = 0.2;        // of an ellipse that follows a part of an outline
+constexpr double kPlainOddness = 0.5;      // what badness adds to
+constexpr double kLeastFilledIn = 1e-3;
+constexpr double kRefusedFilledIn = 0.4;
+
+// What may be completed, in usual depths. There is more at the border of a streak than of a marker.
+struct Least {
+    double ink_depth;
+    double retro_depth;
+};
+constexpr Least kLeastOfPiece{0.45, 0.25};
+constexpr Least kLeastOfLobe{0.7, 0.5};
 
 }  // namespace
 
@@ -56,14 +73,15 @@ double mean_radius_px(const Blob& blob) {
 
 void judge_shape(double noise, const BlobLimits& limits, Blob& blob) {
     const double aspect = blob.long_axis_px / blob.short_axis_px;
+    const Roughness& rough = noise < kSensorNoise ? kSmooth : kRough;
     const double noise_share = std::max(1.0, noise) / blob.contrast;
     const double deviation_limit = limits.max_deviation_px + limits.max_deviation * mean_radius_px(blob) +
-                                   kNoiseDeviationPx * noise_share;
+                                   rough.deviation_px * noise_share;
     const double snr = 1.0 / noise_share;
     blob.snr = snr;
     blob.badness = blob.deviation / deviation_limit + blob.open / limits.max_open +
                    kAspectBadness * (aspect - 1.0) / (limits.max_aspect - 1.0) +
-                   std::max(0.0, kSureSnr - snr) / kSureSnr;
+                   std::max(0.0, rough.sure_snr - snr) / rough.sure_snr;
     blob.rejection = Rejection::kNone;
     if (blob.diameter_px < limits.min_diameter_px) {
         blob.rejection = Rejection::kSmall;
@@ -81,9 +99,19 @@ void judge_shape(double noise, const BlobLimits& limits, Blob& blob) {
 }
 
 bool may_be_completed(Side side, const BlobLimits& limits, const Blob& blob) {
-    const double least = side == Side::kBelow ? kLeastInkDepth : kLeastRetroDepth;
-    return limits.usual_size_px > 0.0 && blob.depth > least * limits.usual_depth &&
+    const Least& least = limits.is_lobe ? kLeastOfLobe : kLeastOfPiece;
+    const double depth = side == Side::kBelow ? least.ink_depth : least.retro_depth;
+    return limits.usual_size_px > 0.0 && blob.depth > depth * limits.usual_depth &&
            blob.long_axis_px < kLongest * limits.usual_size_px;
+}
+
+double completed_sigma_px(const Blob& blob) {
+    if (!blob.completed && !blob.hidden) return 0.0;
+    // Something at it, of which nothing could be filled in: as bad as the most that is.
+    const bool refused = !blob.completed && blob.filled_in < kLeastFilledIn;
+    const double unseen = refused ? kRefusedFilledIn : blob.filled_in;
+    const double unsure_px = kSigmaPerFilledPx * unseen + (blob.completed ? kFitSigmaPx : 0.0);
+    return kWholeSigmaPx + unsure_px * (kPlainOddness + blob.badness);
 }
 
 bool looks_shadowed(const Blob& blob) {

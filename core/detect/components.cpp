@@ -122,4 +122,25 @@ ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits
     return counts;
 }
 
+bool component_of(const BitRows& rows, int height, int left, int top, std::span<Run> runs,
+                  Component& component) {
+    component = Component{};
+    component.left = 0xFFFF;
+    for (int y = 0; y < height; ++y) {
+        for (std::uint64_t rest = rows[static_cast<std::size_t>(y)]; rest != 0;) {
+            const int begin = std::countr_zero(rest);
+            const int end = begin + std::countr_one(rest >> begin);
+            rest = end < 64 ? rest & ~row_mask(end) : 0;
+            if (component.count == runs.size()) return false;
+            const Run run{static_cast<std::uint16_t>(top + y), static_cast<std::uint16_t>(left + begin),
+                          static_cast<std::uint16_t>(left + end)};
+            if (component.count == 0) component.top = run.y;
+            runs[component.count] = run;
+            component.area_px += static_cast<std::uint32_t>(end - begin);
+            widen(component, run);
+        }
+    }
+    return true;
+}
+
 }  // namespace rig

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/detect/bit_rows.hpp"
 #include "core/image/kernels.hpp"
 
 namespace rig {
@@ -24,6 +25,19 @@ struct Component {
 [[nodiscard]] inline std::span<const Run> members_of(const Component& component,
                                                      std::span<const Run> grouped) {
     return grouped.subspan(component.first, component.count);
+}
+
+// Of its box, px.
+[[nodiscard]] inline int length_of(const Component& component) {
+    return std::max(component.right - component.left, component.bottom - component.top) + 1;
+}
+
+// Whether the middle of its box is part of it.
+[[nodiscard]] inline bool holds_its_middle(const Component& component, std::span<const Run> runs) {
+    const int x = (component.left + component.right + 1) / 2;
+    const int y = (component.top + component.bottom + 1) / 2;
+    return std::any_of(runs.begin(), runs.end(),
+                       [&](const Run& run) { return run.y == y && run.begin <= x && x < run.end; });
 }
 
 // Bounds and count of a component with one more run; runs come in raster order.
@@ -65,5 +79,10 @@ struct ComponentCounts {
 // below the least area are counted and left out, so that noise cannot fill the table.
 ComponentCounts connect(std::span<const Run> runs, const ComponentLimits& limits,
                         const ComponentStorage& storage);
+
+// A set of bits, a window's whose corner is (left, top), as a component in pixels of the image; its runs go
+// to `runs`. False: no room.
+[[nodiscard]] bool component_of(const BitRows& rows, int height, int left, int top, std::span<Run> runs,
+                                Component& component);
 
 }  // namespace rig

@@ -76,28 +76,6 @@ void mark_reach(const ExpectedMarker& expected, const Detector::Search& search, 
     for (int row = clamped(y - reach, height); row < last; ++row) rows[static_cast<std::size_t>(row)] = span;
 }
 
-// A connected set of bits as a component in pixels of the image; its runs go to `runs`. False: no room.
-bool component_of(const BitRows& rows, int height, int left, int top, std::span<Run> runs,
-                  Component& component) {
-    component = Component{};
-    component.left = 0xFFFF;
-    for (int y = 0; y < height; ++y) {
-        for (std::uint64_t rest = rows[static_cast<std::size_t>(y)]; rest != 0;) {
-            const int begin = std::countr_zero(rest);
-            const int end = begin + std::countr_one(rest >> begin);
-            rest = end < 64 ? rest & ~row_mask(end) : 0;
-            if (component.count == runs.size()) return false;
-            const Run run{static_cast<std::uint16_t>(top + y), static_cast<std::uint16_t>(left + begin),
-                          static_cast<std::uint16_t>(left + end)};
-            if (component.count == 0) component.top = run.y;
-            runs[component.count] = run;
-            component.area_px += static_cast<std::uint32_t>(end - begin);
-            widen(component, run);
-        }
-    }
-    return true;
-}
-
 bool are_one(const Blob& a, const Blob& b) {
     const double dx = a.x_px - b.x_px;
     const double dy = a.y_px - b.y_px;
@@ -136,13 +114,15 @@ bool Detector::search_window(const ImageView& image, Side side, const ExpectedMa
                         .bottom = window.bottom};
     const std::size_t before = result.blobs.size();
     if (!examine_window(search, expected, result)) return false;
-    const bool found = std::any_of(result.blobs.begin(), result.blobs.end(), [&](const Blob& blob) {
-        return is_within_reach(blob.x_px, blob.y_px, expected);
-    });
-    if (found) drop_cut_off(search);
+    if (is_met(expected, result)) drop_cut_off(search);
     split_failed(search, means, result);
     drop_repeats(before, result);
     return true;
+}
+
+bool Detector::is_met(const ExpectedMarker& expected, const SideResult& result) {
+    return std::any_of(result.blobs.begin(), result.blobs.end(),
+                       [&](const Blob& blob) { return is_within_reach(blob.x_px, blob.y_px, expected); });
 }
 
 // What only reaches into the window is left to the window it belongs to, unless the marker may be in it.
@@ -221,6 +201,7 @@ bool Detector::search_windows(const ImageView& image, Side side, std::span<const
     result.blobs.clear();
     result.report = DetectorReport{};
     result.second_looks = 0;
+    result.tiles = 0;
     workspace_.examined.clear();
     set_core_steps(side);
     for (const ExpectedMarker& marker : expected) {

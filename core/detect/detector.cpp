@@ -19,16 +19,17 @@ namespace {
 constexpr int kBlock = static_cast<int>(kBlockPx);
 constexpr int kLumaRows = 8;    // every so manieth row is enough for the mean
 constexpr int kCorePixels = 3;  // beyond one and a half thresholds
-constexpr std::array<double, kSplitLevels> kSplitDepths = {0.0, 0.5,
-                                                           0.75};  // of a component's own range of grey
-constexpr double kFringe = 4.0;          // px by which blur and noise lengthen a component
-constexpr double kSizeMargin = 1.6;      // largest marker of an image / usual marker
-constexpr double kSettledQuality = 4.0;  // summed scores below which a settled polarity is doubted
-constexpr std::uint32_t kSparse = 2;     // boxes are that much larger than what is in them
-constexpr std::size_t kMostSecondLooks =
-    128;                          // of an image or its windows: texture like a beard has hundreds of pieces
-constexpr double kDimmest = 0.4;  // of the least contrast, in a dim image
+constexpr std::array<double, kSplitLevels> kSplitDepths{0.0, 0.5, 0.75};  // of a component's own range
+constexpr double kFringe = 4.0;           // px by which blur and noise lengthen a component
+constexpr double kSizeMargin = 1.6;       // largest marker of an image / usual marker
+constexpr double kSettledQuality = 4.0;   // summed scores below which a settled polarity is doubted
+constexpr std::uint32_t kSparse = 2;      // boxes are that much larger than what is in them
+constexpr double kDimmest = 0.4;          // of the least contrast, in a dim image
 constexpr double kTriedSizes = 1.5;       // long components are no one marker
+constexpr double kLobedSizes = 24.0;      // so long at most is what a marker sticks out of, with it; and
+constexpr double kLobedPartSizes = 5.0;   // a part at a deeper level
+constexpr double kLineSizes = 1.35;       // so long is a line, and so thin
+constexpr double kLineAspect = 3.3;       // length^2 / area; a disc: 1.3
 constexpr double kHopelessBadness = 1.5;  // score 0
 constexpr double kLittlePart =
     0.3;  // of a usual size's square, some 0.4 of a marker seen from the front; and one
@@ -129,16 +130,11 @@ std::size_t cut_at_depth(const Detector::Search& search, double depth, std::span
     });
 }
 
-int length_of(const Component& component) {
-    return std::max(component.right - component.left, component.bottom - component.top) + 1;
-}
-
-// Whether the middle of a component's box is part of it.
-bool holds_its_middle(const Component& component, std::span<const Run> runs) {
-    const int x = (component.left + component.right + 1) / 2;
-    const int y = (component.top + component.bottom + 1) / 2;
-    return std::any_of(runs.begin(), runs.end(),
-                       [&](const Run& run) { return run.y == y && run.begin <= x && x < run.end; });
+// Longer than a marker and thinner than one seen aslant, as an ellipse of its length and area.
+bool is_line(const Component& component, double usual_size_px) {
+    const double length = length_of(component);
+    return usual_size_px > 0.0 && length > kLineSizes * usual_size_px &&
+           length * length > kLineAspect * component.area_px;
 }
 
 // Whether no other part of the same larger component reaches into the window around this one; crumbs of
@@ -278,6 +274,7 @@ void Detector::detect_side(const ImageView& image, const BlockGrid& means, Side 
     result.blobs.clear();
     result.report = DetectorReport{};
     result.second_looks = 0;
+    result.tiles = 0;
     w.failed.clear();
     const BlockGrid thresholds{std::span(w.background).first(means.values.size()), means.width, means.height};
     const double largest = largest_marker(state_.usual_size_px);
@@ -337,6 +334,7 @@ void Detector::split_failed(const Search& wide, const BlockGrid& means, SideResu
         Search inner = search;
         if (length_of(component) < kTriedSizes * usual) inner.usual_size_px = 0.0;
         split(inner, narrower ? 0 : 1, component, runs, result);
+        examine_lobes(inner, component, runs, kLobedSizes, result);
     }
 }
 
@@ -373,6 +371,7 @@ bool Detector::examine(const Search& search, const Component& component, std::sp
         reject(Rejection::kLarge);
         return false;
     }
+    if (is_line(component, search.usual_size_px)) return reject(Rejection::kElongated), false;
     BlobLimits limits = config_.blob;
     limits.usual_size_px = result.second_looks < kMostSecondLooks ? search.usual_size_px : 0.0;
     limits.usual_depth = search.usual_depth;
@@ -421,11 +420,13 @@ void Detector::split(const Search& search, std::size_t level, const Component& c
         const Component& part = storage.components[c];
         const std::span<const Run> members = members_of(part, storage.grouped);
         if (search.cuts_off(part)) continue;  // another window sees all of it, or nobody does
-        // One little part among several of something larger is texture, unless it is clear of the others.
+        // One little part among several is texture, unless it is clear of the others.
         const bool little = part.area_px < search.little_area_px;
         if (little && counts.components > kFewParts && !is_apart(part, members, all)) continue;
         if (!whole && examine(search, part, members, all, result)) continue;
-        if (level + 1 < kSplitLevels) split(search, level + 1, part, members, result);
+        const bool crumb = little && search.usual_size_px > 0.0;
+        if (level + 1 < kSplitLevels && !crumb) split(search, level + 1, part, members, result);
+        examine_lobes(search, part, members, level == 0 ? kLobedSizes : kLobedPartSizes, result);
     }
 }
 
@@ -448,7 +449,8 @@ void Detector::drop_pieces(SideResult& result) {
             if (k == i ||
                 !(is_inside(whole, other.x_px, other.y_px) || is_inside(other, whole.x_px, whole.y_px)))
                 continue;
-            dropped[key(other) < key(whole) ? i : k] = true;
+            const bool worse = key(other) < key(whole) || (k < i && key(other) == key(whole));
+            dropped[worse ? i : k] = true;
         }
     }
     for (std::size_t i = 0; i < blobs.size(); ++i) {
@@ -515,9 +517,12 @@ void Detector::hand_on(const SideResult& result, Observations& observations, Det
     for (const Blob& blob : result.blobs) {
         if (blob.rejection != Rejection::kNone || blob.score < config_.min_score) continue;
         const auto score = static_cast<float>(blob.score);
-        const Observation seen{static_cast<float>(blob.x_px), static_cast<float>(blob.y_px),
+        const Observation seen{static_cast<float>(blob.x_px),
+                               static_cast<float>(blob.y_px),
                                static_cast<float>(blob.diameter_px),
-                               static_cast<float>(std::min(1.0, blob.contrast / 255.0)), score};
+                               static_cast<float>(std::min(1.0, blob.contrast / 255.0)),
+                               score,
+                               static_cast<float>(completed_sigma_px(blob))};
         if (score < least || !observations.push_back(seen)) {
             ++report.left_out;
             report.observations_full = true;

@@ -11,6 +11,7 @@
 #include "core/base/faults.hpp"
 #include "core/base/result.hpp"
 #include "core/detect/blob.hpp"
+#include "core/detect/lobes.hpp"
 #include "core/detect/observation.hpp"
 #include "core/detect/population.hpp"
 #include "core/detect/quick_blob.hpp"
@@ -80,6 +81,11 @@ inline constexpr float kMaxReachPx =
     24.0F;  // an expected marker farther away than that is searched for in vain
 inline constexpr double kWindowShare = 0.75;
 
+// Blobs of an image or its windows that are looked at again for pieces or for a part of an outline: texture
+// like a beard has hundreds of pieces.
+inline constexpr std::size_t kMostSecondLooks = 128;
+inline constexpr std::size_t kMaxLobeRuns = kBlobWindowPx * (kBlobWindowPx / 2 + 1);
+
 // How often a blob that is no marker is cut again.
 inline constexpr std::size_t kSplitLevels = 3;
 
@@ -105,9 +111,10 @@ class Detector {
         const ImageView& image;
         const BlockGrid& thresholds;
         Side side = Side::kBelow;
-        double largest_px = 0.0;           // longest marker
-        double usual_size_px = 0.0;        // long axis of the image's markers; 0: unknown,
-        double usual_depth = 0.0;          // of their depths; 0: unknown
+        double largest_px = 0.0;                   // longest marker
+        double usual_size_px = 0.0;                // long axis of the image's markers; 0: unknown,
+        double usual_depth = 0.0;                  // of their depths; 0: unknown
+        const ExpectedMarker* expected = nullptr;  // the marker that a window is for
         bool first_look = false;           // the markers' size is not known yet: odd blobs get another look
         std::uint32_t little_area_px = 0;  // of a part among several, below which it must stand clear
         int left = 0;                      // px: what is looked at, and where the thresholds' grid begins
@@ -154,6 +161,7 @@ class Detector {
         double quality = 0.0;
         double usual_size_px = 0.0;  // long axis; 0 when the markers are too few
         double usual_depth = 0.0;
+        std::size_t tiles = 0;         // that were searched for lobes
         std::size_t second_looks = 0;  // blobs whose pieces or outline may have been completed
     };
 
@@ -180,6 +188,7 @@ class Detector {
         BitRows window{};                                     // beyond the threshold, not examined yet
         BitRows reach{};
         BitRows part{};
+        std::array<Run, kMaxLobeRuns> lobe_runs{};  // of a lobe and of the rest of its tile
         BlobWorkspace blob;
         QuickWorkspace quick;
         std::array<SideResult, 2> sides;
@@ -212,6 +221,13 @@ class Detector {
     [[nodiscard]] bool examine(const Search& search, const Component& component, std::span<const Run> runs,
                                const Siblings& siblings, SideResult& result);
     void set_core_steps(Side side);
+    void examine_lobes(const Search& search, const Component& component, std::span<const Run> runs,
+                       double most_sizes, SideResult& result);
+    void examine_tile(const Search& search, std::span<const Run> runs, const RunEnds& ends,
+                      const BitBox& tile, const BitBox& own, SideResult& result);
+    void examine_lobe(const Search& search, const BitRows& area, const BitRows& lobe, const BitBox& tile,
+                      SideResult& result);
+    [[nodiscard]] static bool is_met(const ExpectedMarker& expected, const SideResult& result);
     [[nodiscard]] bool has_core(const Search& search, std::span<const Run> runs) const;
     void apply_population(const ImageView& image, Side side, SideResult& result) const;
     [[nodiscard]] std::size_t look(const ImageView& image, const BlockGrid& means, DetectorReport& report);

@@ -22,6 +22,9 @@ constexpr std::array<FourFloats, 2> kHalfTurnX{FourFloats{1.0F, kC1, kC2, kC3},
 constexpr std::array<FourFloats, 2> kHalfTurnY{FourFloats{0.0F, kC3, kC2, kC1},
                                                FourFloats{1.0F, kC1, kC2, kC3}};
 
+constexpr float kBeyond = 2.5F;     // such steps outside it: skin, or shade on it
+constexpr double kLeastStep = 0.4;  // from the core to there, of the contrast
+
 // Between four pixels each; beyond the border, the border's.
 FourFloats levels_at(const ImageView& image, FourFloats x, FourFloats y) {
     x = less_of(greater_of(x, FourFloats{}), all_four(static_cast<float>(image.width_px - 1)));
@@ -56,6 +59,17 @@ double edge_slope(const ImageView& image, Side side, const Blob& blob) {
     const FourFloats xx = of(2.0 * root_xx), xy = of(2.0 * blob.xy / root_xx);
     const FourFloats yy = of(2.0 * sqrt(determinant / blob.xx));
     const FourFloats centre_x = of(blob.x_px), centre_y = of(blob.y_px);
+    // Bright sides are measured inverted: what is above 255 less a level is as far above the core.
+    const float turn = side == Side::kBelow ? 1.0F : -1.0F;
+    const FourFloats core = of((side == Side::kBelow ? 0.0 : -255.0) + blob.background - blob.contrast);
+    const FourFloats least = of(kLeastStep * blob.contrast);
+    // Of the step from the core to what is beyond, in one direction each.
+    const auto changes_along = [&](FourFloats dx, FourFloats dy, FourFloats nx, FourFloats ny) {
+        const FourFloats x = centre_x + dx, y = centre_y + dy;
+        const FourFloats change = levels_at(image, x + nx, y + ny) - levels_at(image, x - nx, y - ny);
+        const FourFloats beyond = levels_at(image, x + kBeyond * nx, y + kBeyond * ny);
+        return turn * change / greater_of(least, turn * beyond - core);
+    };
     std::array<float, 16> changes;
     for (std::size_t half = 0; half < 2; ++half) {
         const FourFloats dx = xx * kHalfTurnX[half];
@@ -66,16 +80,12 @@ double edge_slope(const ImageView& image, Side side, const Blob& blob) {
         const FourFloats scale = kStepPx / roots_of(square);
         nx *= scale;
         ny *= scale;
-        const FourFloats out_x = dx + nx, out_y = dy + ny, in_x = dx - nx, in_y = dy - ny;
-        const FourFloats one = levels_at(image, centre_x + out_x, centre_y + out_y) -
-                               levels_at(image, centre_x + in_x, centre_y + in_y);
-        const FourFloats other = levels_at(image, centre_x - out_x, centre_y - out_y) -
-                                 levels_at(image, centre_x - in_x, centre_y - in_y);
+        const FourFloats one = changes_along(dx, dy, nx, ny);
+        const FourFloats other = changes_along(-dx, -dy, -nx, -ny);
         std::memcpy(&changes[8 * half], &one, sizeof(one));
         std::memcpy(&changes[8 * half + 4], &other, sizeof(other));
     }
-    const double change = ranked(changes, changes.size() / 2) / blob.contrast;
-    return side == Side::kBelow ? change : -change;
+    return ranked(changes, changes.size() / 2);
 }
 
 }  // namespace rig

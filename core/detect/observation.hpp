@@ -18,9 +18,10 @@ struct Observation {
     float diameter_px = 0.0F;  // of the disc with the blob's area
     float contrast = 0.0F;     // |blob - background| / full scale, 0..1
     float score = 0.0F;        // 0..1, how much it looks like a marker
+    float sigma_px = 0.0F;  // standard deviation of the centre of one that was completed; 0: kCentreSigmaPx
 };
 
-// Standard deviation of a detected centre: measured on rendered frames, blur and noise.
+// Standard deviation of the centre of a marker seen whole: measured on rendered frames, blur and noise.
 inline constexpr double kCentreSigmaPx = 0.15;
 
 using Observations = BoundedVector<Observation, kMaxObservations>;

@@ -42,7 +42,6 @@ constexpr double kInside = 0.8;                  // px within the ellipse where 
 constexpr double kOutside = 1.0;                 // and outside it where there should be none
 constexpr double kRimPx = 1.0;                   // what reaches so far out goes on beyond
 constexpr int kLeastPiece = 3;                   // pixels
-constexpr double kLeastFollowed = 0.6;
 constexpr double kLeastFilled = 0.5;
 
 struct Origin {
@@ -234,6 +233,11 @@ double followed_part(const Points& points, float reach, const Conic& conic, cons
     return static_cast<double>(ones(sectors)) / kSectors;
 }
 
+double long_axis_px(const Ellipse& e) {
+    const double half = 0.5 * (e.xx - e.yy);
+    return 4.0 * sqrt(0.5 * (e.xx + e.yy) + sqrt(half * half + e.xy * e.xy));
+}
+
 // The ellipse grown by `by` px.
 EllipseRows rows_of(const Ellipse& e, double by) {
     const double mean = sqrt(sqrt(std::max(1e-9, e.xx * e.yy - e.xy * e.xy)));  // half the mean radius
@@ -292,7 +296,7 @@ bool gather_pieces(double x, double y, double radius, int outline, BlobWorkspace
     return true;
 }
 
-bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
+bool follow_ellipse(const BlobWorkspace& w, int outline, const EllipseLimits& limits, Ellipse& ellipse) {
     Points points;
     gather_points(w, outline, points);
     if (points.count < kMinPoints) return false;
@@ -308,8 +312,9 @@ bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
     double best = 0.0;
     std::array<Ellipse, kDirections.size() + 1> tried;
     std::size_t tries = 0;
+    const std::size_t last = limits.disturbed ? kDirections.size() : 0;
     // From all points, and then, unless those agree, without those on one side after the other.
-    for (std::size_t start = 0; start <= kDirections.size() && best < kAgreed; ++start) {
+    for (std::size_t start = 0; start <= last && best < kAgreed; ++start) {
         const Point left_out = start > 0 ? kDirections[start - 1] : Point{};
         Conic conic{};
         Ellipse fitted;
@@ -319,9 +324,10 @@ bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
             const auto same = [&](const Ellipse& e) { return are_one(e, fitted); };
             if (std::any_of(before.begin(), before.end(), same)) continue;
             tried[tries++] = fitted;
-            if (followed_part(points, kMayFollow, conic, origin, fitted) < kLeastFollowed) continue;
+            if (followed_part(points, kMayFollow, conic, origin, fitted) < limits.least_followed) continue;
         }
         if (!fit_in_rounds(points, kLastReaches, conic) || !ellipse_of(conic, origin, fitted)) continue;
+        if (long_axis_px(fitted) > limits.longest_px) continue;
         fitted.followed = followed_part(points, kFollows, conic, origin, fitted);
         if (fitted.followed <= best) continue;
         const double quality = fitted.followed * filled_part(fitted, w);
@@ -329,7 +335,7 @@ bool follow_ellipse(const BlobWorkspace& w, int outline, Ellipse& ellipse) {
         best = quality;
         ellipse = fitted;
     }
-    return ellipse.followed >= kLeastFollowed && best > 0.0;
+    return ellipse.followed >= limits.least_followed && best > 0.0;
 }
 
 bool keep_ellipse(const Ellipse& ellipse, BlobWorkspace& w) {

@@ -18,6 +18,12 @@ struct Ellipse {
     double followed = 0.0;  // part of its rim that the outline follows
 };
 
+struct EllipseLimits {
+    double longest_px = 64.0;     // its diameter at most
+    double least_followed = 0.6;  // part of its rim that the outline follows
+    bool disturbed = true;        // what is not of it may be a whole side of the outline
+};
+
 // Makes the blob every piece of paint, at which cover passes `outline`, that lies within `radius` of a place
 // of the window and does not go on beyond it. False when that is no more than the blob already was. Cover
 // must be known as far.
@@ -29,7 +35,8 @@ void mark_disc(double x, double y, double radius, const BlobWorkspace& workspace
 // The ellipse along which most of the outline lies at which cover passes `outline`, of workspace.blob and
 // whatever else of it is inside. Weighted algebraic fit (Sampson82, eq. 1 as weights) in rounds that leave
 // out what lies farther and farther off. False when there is no such ellipse.
-[[nodiscard]] bool follow_ellipse(const BlobWorkspace& workspace, int outline, Ellipse& ellipse);
+[[nodiscard]] bool follow_ellipse(const BlobWorkspace& workspace, int outline, const EllipseLimits& limits,
+                                  Ellipse& ellipse);
 
 // Makes the blob what of it lies in the ellipse, and marks in `hidden` what is paint beside it or none in it,
 // and one step around. False when less than half of the ellipse is paint.

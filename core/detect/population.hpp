@@ -24,8 +24,8 @@ struct Population {
 };
 
 struct PopulationLimits {
-    double size_ratio = 1.5;  // long axis / median, or median / long axis: one unit of badness
-    double ink_spread = 0.6;  // part of the expected depth that a dark marker may lack: one unit of badness;
+    double size_ratio = 1.5;   // long axis / median, or median / long axis: one unit of badness
+    double ink_spread = 0.75;  // part of the expected depth that a dark marker may lack: one unit of badness;
     double retro_spread = 1.6;  // of a bright one, whose return falls with the angle
     std::size_t quorum = 8;     // markers needed before their medians say anything
 };

@@ -35,7 +35,7 @@ void add_camera_view(const CameraModel& camera, std::span<const Observation> obs
     set.from_cameras = true;
     set.cameras[view] = camera;
     set.row_delays = set.row_delays || camera.row_time_us > 0.0;
-    const double sigma_mm = sigma_px * expected_depth_mm / (0.5 * (camera.fx_px + camera.fy_px));
+    const double mm_per_px = expected_depth_mm / (0.5 * (camera.fx_px + camera.fy_px));
     std::size_t next_left_out = 0;
     for (std::size_t i = 0; i < observations.size(); ++i) {
         if (next_left_out < left_out.size() && left_out[next_left_out] == i) {
@@ -45,6 +45,7 @@ void add_camera_view(const CameraModel& camera, std::span<const Observation> obs
         Sighting sighting;
         sighting.point_mm = camera.centre_mm;
         sighting.direction = pixel_ray(camera, pixel_of(observations[i]));
+        const double sigma_mm = std::max(sigma_px, static_cast<double>(observations[i].sigma_px)) * mm_per_px;
         sighting.information = 1.0 / (sigma_mm * sigma_mm);
         sighting.delay_us = row_delay_us(camera, static_cast<double>(observations[i].y_px));
         if (finite(sighting.direction)) append(set, view, i, sighting);

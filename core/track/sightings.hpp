@@ -49,8 +49,8 @@ struct SightingSet {
 [[nodiscard]] Sighting at_capture(const Sighting& sighting, const Vec3& velocity_mm_per_us);
 
 // Rays of one camera's observations, each with the delay of its row. sigma_px: standard deviation of a blob's
-// centre; expected_depth_mm: where the face is, to turn pixels into millimetres across the ray. left_out:
-// indices of observations, rising, that are no markers of a face.
+// centre, where the observation does not say more; expected_depth_mm: where the face is, to turn pixels into
+// millimetres across the ray. left_out: indices of observations, rising, that are no markers of a face.
 void add_camera_view(const CameraModel& camera, std::span<const Observation> observations, double sigma_px,
                      double expected_depth_mm, SightingSet& set,
                      std::span<const std::uint16_t> left_out = {});

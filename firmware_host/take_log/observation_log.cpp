@@ -10,7 +10,7 @@ namespace rig {
 namespace {
 
 constexpr std::array<char, 4> kMagic{'R', 'G', 'O', '1'};
-constexpr std::uint16_t kVersion = 2;
+constexpr std::uint16_t kVersion = 3;
 constexpr std::size_t kFirstVersionHeaderBytes = 64;
 constexpr std::uint8_t kFilterBit = 1;
 constexpr std::uint8_t kStabiliseBit = 2;
@@ -84,7 +84,8 @@ std::size_t write_record(const ObservationTick& tick, std::uint8_t camera_count,
         const std::size_t count = std::min(tick.cameras[c].size(), kMaxObservations);
         writer.write(static_cast<std::uint16_t>(count));
         for (const Observation& o : tick.cameras[c].first(count)) {
-            writer.write(std::array<float, 5>{o.x_px, o.y_px, o.diameter_px, o.contrast, o.score});
+            writer.write(
+                std::array<float, 6>{o.x_px, o.y_px, o.diameter_px, o.contrast, o.score, o.sigma_px});
         }
     }
     if (tick.new_controls != nullptr) write_controls(*tick.new_controls, writer);
@@ -170,12 +171,13 @@ Result<ObservationLogReader, ObservationLogError> ObservationLogReader::open(Byt
     log.header_.stabilise = (flags & kStabiliseBit) != 0;
     log.header_.camera_on_head = (flags & kOffHeadBit) == 0;
     log.header_.loss_policy = static_cast<std::uint8_t>((flags & ~kOffHeadBit) >> 2);
-    const bool known = magic == kMagic && (version == 1 || version == kVersion) &&
+    const bool known = magic == kMagic && version >= 1 && version <= kVersion &&
                        log.header_.camera_count >= 1 && log.header_.camera_count <= kMaxCameras &&
                        log.header_.rate_millihertz > 0 && log.header_.rate_millihertz <= 1'000'000 &&
                        log.header_.loss_policy <= 1 && reserved == 0 &&
                        padding == std::array<std::uint8_t, 3>{} && tail == std::array<std::uint8_t, 15>{};
     if (!known) return failure(ObservationLogError::kFormat);
+    log.has_sigma_ = version >= 3;
     if (version == 1) {
         log.position_ = kFirstVersionHeaderBytes;
         if (log.header_.smoothing.delay_frames != 0) return failure(ObservationLogError::kFormat);
@@ -194,10 +196,12 @@ bool ObservationLogReader::read_observations(ByteReader& reader, ObservationTick
         const std::span<Observation> place = std::span(observations_).subspan(c * kMaxObservations, count);
         for (Observation& observation : place) {
             const auto numbers = reader.read<std::array<float, 5>>();
+            const float sigma_px = has_sigma_ ? reader.read<float>() : 0.0F;
             for (const float number : numbers) {
                 if (!std::isfinite(number)) return false;
             }
-            observation = {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]};
+            if (!std::isfinite(sigma_px) || sigma_px < 0.0F) return false;
+            observation = {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], sigma_px};
         }
         tick.cameras[c] = place;
     }

@@ -1,7 +1,8 @@
 // A take as detection saw it, for solving it again on the desk: `headrigd --log-observations FILE`, `headrig
 // replay`. Little-endian. Header, 320 bytes:
 //   0  4  "RGO1"
-//   4  2  u16 version, 2. Version 1 is read too: its header ends at byte 64, and every shape had One Euro
+//   4  2  u16 version, 3. Version 2 is read too: its observations lack sigma_px, 0. So is version 1: besides,
+//         its header ends at byte 64, and every shape had One Euro
 //   6  1  u8 camera count, 1..4
 //   7  1  u8 reserved, 0
 //   8  4  u32 ticks per 1000 s
@@ -20,7 +21,8 @@
 //         a neutral was begun to be taken; bit 3: the neutral was forgotten; others 0
 //  17  4  u8 status of each camera, 0 for cameras beyond the count
 //  21  3  zero
-//  24     per camera: u16 count, then count times 5 x f32 (x_px, y_px, diameter_px, contrast, score)
+//  24     per camera: u16 count, then count times 6 x f32 (x_px, y_px, diameter_px, contrast, score,
+//         sigma_px)
 //         with bit 1 then all controls (core/solve/controls.hpp): 256 times 7 x f32 (sparsity, ridge,
 //         temporal, multiplier, offset, low, high); u16 count of symmetry pairs, then count times 2 x u16 and
 //         f32; u16 count of cancel pairs, then count times 2 x u16
@@ -49,7 +51,7 @@ namespace rig {
 
 inline constexpr std::size_t kObservationLogHeaderBytes = 64 + kMaxShapes;
 inline constexpr std::size_t kObservationRecordHeadBytes = 24;
-inline constexpr std::size_t kObservationBytes = 20;
+inline constexpr std::size_t kObservationBytes = 24;
 inline constexpr std::size_t kMaxObservationRecordBytes =
     kObservationRecordHeadBytes + kMaxCameras * (2 + kMaxObservations * kObservationBytes) + kMaxShapes * 28 +
     2 + kMaxControlPairs * 8 + 2 + kMaxControlPairs * 4 + 4;
@@ -141,6 +143,7 @@ class ObservationLogReader {
     [[nodiscard]] bool read_controls(ByteReader& reader, ObservationTick& tick);
 
     ByteSpan bytes_;
+    bool has_sigma_ = true;  // of observations: since version 3
     std::size_t position_ = kObservationLogHeaderBytes;
     ObservationLogHeader header_;
     std::vector<Observation> observations_;

@@ -210,6 +210,48 @@ TEST(Discs, CentresOnceEachMarkersOffsetIsLearnt) {
     }
 }
 
+// Errors of completed markers in units of what they say of themselves, to the picture's centroid.
+TEST(Discs, CompletedMarkersSayHowFarOffTheyMayBe) {
+    for (const std::uint64_t seeds : {kSeeds, kFresh}) {
+        double square = 0.0;
+        double square_px2 = 0.0;
+        double mean_sigma_px = 0.0;
+        std::size_t count = 0;
+        for (const Disturbance disturbance :
+             {Disturbance::kGlintsOnDiscs, Disturbance::kStreaks, Disturbance::kHighlights,
+              Disturbance::kLashes, Disturbance::kLipShadow, Disturbance::kEverything}) {
+            for (std::uint64_t k = 0; k < 12; ++k) {
+                const test::DiscSceneConfig config = scene(k, k % 2 == 1, disturbance, seeds);
+                const test::DiscPicture picture = test::render(config);
+                const Observations observations = observe(config, picture);
+                const auto truth = test::true_dots(picture);
+                for (std::size_t i = 0; i < truth.size(); ++i) {
+                    const test::DiscTruth& disc = picture.discs[i];
+                    const Observation* best = nearest_to(disc, truth[i].reach_px, observations);
+                    if (best == nullptr || best->sigma_px == 0.0F) continue;
+                    const double sigma_px = static_cast<double>(best->sigma_px);
+                    EXPECT_GE(sigma_px, kCentreSigmaPx - 1e-6);
+                    const double off_px = std::hypot(static_cast<double>(best->x_px) - disc.centroid_x_px,
+                                                     static_cast<double>(best->y_px) - disc.centroid_y_px);
+                    square += off_px * off_px / (sigma_px * sigma_px);
+                    square_px2 += off_px * off_px;
+                    mean_sigma_px += sigma_px;
+                    ++count;
+                }
+            }
+        }
+        const double ratio = std::sqrt(square / static_cast<double>(count));
+        std::printf(
+            "    %s seeds: %zu completed markers, rms %.2f px, mean sigma %.2f px, rms of error / sigma "
+            "%.2f\n",
+            seeds == kFresh ? "fresh" : "seen ", count, std::sqrt(square_px2 / static_cast<double>(count)),
+            mean_sigma_px / static_cast<double>(count), ratio);
+        EXPECT_GT(count, 100U);
+        EXPECT_GE(ratio, 0.5);
+        EXPECT_LE(ratio, 2.0);
+    }
+}
+
 struct Bounds {
     double least_recall;
     double least_precision;
@@ -249,27 +291,27 @@ TEST_P(Disturbances, MarkersAreFoundAndNothingElse) {
 // rms is of all that is found, half-hidden ones among them.
 INSTANTIATE_TEST_SUITE_P(
     Kinds, Disturbances,
-    testing::Values(Case{Disturbance::kGlintsOnDiscs, false, {0.990, 0.999, 0.11}, {0.990, 0.999, 0.11}},
+    testing::Values(Case{Disturbance::kGlintsOnDiscs, false, {0.995, 0.999, 0.11}, {0.990, 0.999, 0.11}},
                     Case{Disturbance::kGlintsOnSkin, false, {0.995, 0.999, 0.17}, {0.995, 0.999, 0.15}},
                     Case{Disturbance::kStreaks, false, {0.995, 0.999, 0.22}, {0.995, 0.999, 0.23}},
-                    Case{Disturbance::kHighlights, false, {0.995, 0.999, 0.36}, {0.995, 0.999, 0.25}},
-                    Case{Disturbance::kNostrils, false, {0.995, 0.994, 0.08}, {0.995, 0.993, 0.09}},
-                    Case{Disturbance::kLashes, false, {0.995, 0.999, 0.10}, {0.990, 0.999, 0.09}},
-                    Case{Disturbance::kLipShadow, false, {0.981, 0.999, 0.10}, {0.988, 0.999, 0.10}},
+                    Case{Disturbance::kHighlights, false, {0.995, 0.999, 0.36}, {0.995, 0.999, 0.28}},
+                    Case{Disturbance::kNostrils, false, {0.995, 0.996, 0.08}, {0.995, 0.993, 0.09}},
+                    Case{Disturbance::kLashes, false, {0.995, 0.999, 0.10}, {0.995, 0.999, 0.09}},
+                    Case{Disturbance::kLipShadow, false, {0.990, 0.999, 0.10}, {0.995, 0.999, 0.10}},
                     Case{Disturbance::kMotion, false, {0.995, 0.999, 0.09}, {0.995, 0.999, 0.10}},
                     Case{Disturbance::kOverexposed, false, {0.995, 0.999, 0.09}, {0.995, 0.999, 0.09}},
                     Case{Disturbance::kUnderexposed, false, {0.995, 0.999, 0.15}, {0.995, 0.999, 0.14}},
-                    Case{Disturbance::kEverything, false, {0.977, 0.991, 0.47}, {0.980, 0.988, 0.30}},
+                    Case{Disturbance::kEverything, false, {0.984, 0.991, 0.47}, {0.984, 0.986, 0.34}},
                     Case{Disturbance::kGlintsOnDiscs, true, {0.995, 0.999, 0.11}, {0.995, 0.999, 0.11}},
-                    Case{Disturbance::kGlintsOnSkin, true, {0.983, 0.994, 0.39}, {0.978, 0.993, 0.37}},
-                    Case{Disturbance::kStreaks, true, {0.995, 0.999, 0.12}, {0.985, 0.999, 0.18}},
-                    Case{Disturbance::kHighlights, true, {0.974, 0.999, 0.12}, {0.974, 0.999, 0.13}},
+                    Case{Disturbance::kGlintsOnSkin, true, {0.984, 0.994, 0.39}, {0.984, 0.993, 0.37}},
+                    Case{Disturbance::kStreaks, true, {0.995, 0.999, 0.14}, {0.990, 0.995, 0.19}},
+                    Case{Disturbance::kHighlights, true, {0.984, 0.999, 0.13}, {0.980, 0.999, 0.14}},
                     Case{Disturbance::kNostrils, true, {0.995, 0.999, 0.11}, {0.995, 0.999, 0.11}},
                     Case{Disturbance::kLashes, true, {0.995, 0.999, 0.12}, {0.995, 0.999, 0.12}},
                     Case{Disturbance::kLipShadow, true, {0.995, 0.999, 0.15}, {0.995, 0.999, 0.19}},
                     Case{Disturbance::kMotion, true, {0.995, 0.999, 0.13}, {0.995, 0.999, 0.12}},
                     Case{Disturbance::kOverexposed, true, {0.995, 0.999, 0.09}, {0.995, 0.999, 0.09}},
-                    Case{Disturbance::kUnderexposed, true, {0.981, 0.999, 0.22}, {0.986, 0.999, 0.21}},
-                    Case{Disturbance::kEverything, true, {0.977, 0.999, 0.38}, {0.957, 0.991, 0.42}}));
+                    Case{Disturbance::kUnderexposed, true, {0.990, 0.999, 0.23}, {0.992, 0.999, 0.23}},
+                    Case{Disturbance::kEverything, true, {0.980, 0.996, 0.42}, {0.964, 0.987, 0.42}}));
 
 }  // namespace

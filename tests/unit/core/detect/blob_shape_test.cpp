@@ -115,4 +115,23 @@ TEST(BlobShape, NoiseExcusesARoughOutlineAndCostsScore) {
     EXPECT_GT(noisy.badness, clean.badness);
 }
 
+TEST(BlobShape, TheMoreWasFilledInTheLessSureIsTheCentre) {
+    Blob blob;
+    EXPECT_EQ(completed_sigma_px(blob), 0.0);
+    blob.hidden = true;
+    blob.filled_in = 0.1;
+    const double little = completed_sigma_px(blob);
+    EXPECT_GT(little, 0.15);
+    blob.filled_in = 0.3;
+    const double much = completed_sigma_px(blob);
+    EXPECT_GT(much, little);
+    blob.filled_in = 0.0;  // too much was hidden to fill anything in
+    EXPECT_GT(completed_sigma_px(blob), much);
+    blob.filled_in = 0.3;
+    blob.completed = true;
+    EXPECT_GT(completed_sigma_px(blob), much);
+    blob.badness = 1.0;
+    EXPECT_GT(completed_sigma_px(blob), much + 0.3);
+}
+
 }  // namespace

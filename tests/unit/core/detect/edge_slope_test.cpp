@@ -28,13 +28,14 @@ test::Picture ramp(double width_px, double inside, double outside) {
     return picture;
 }
 
-Blob blob() {
+Blob blob(double background = 140.0) {
     Blob blob;
     blob.x_px = 15.3;
     blob.y_px = 16.2;
     blob.xx = 25.0 / 4.0;
     blob.yy = 12.25 / 4.0;
     blob.contrast = 100.0;
+    blob.background = background;  // of bright ones, 255 less the level
     return blob;
 }
 
@@ -47,11 +48,17 @@ TEST(EdgeSlope, FallsWithTheWidthOfTheEdge) {
 
 TEST(EdgeSlope, BrightOnesAreMeasuredAlikeAndGlintsOutvoted) {
     const double dark = edge_slope(ramp(3.0, 40, 140).view(), Side::kBelow, blob());
-    EXPECT_NEAR(edge_slope(ramp(3.0, 140, 40).view(), Side::kAbove, blob()), dark, 0.02);
+    EXPECT_NEAR(edge_slope(ramp(3.0, 140, 40).view(), Side::kAbove, blob(215.0)), dark, 0.02);
     test::Picture disturbed = ramp(3.0, 40, 140);
     for (int y = 15; y < 18; ++y)
         for (int x = 20; x < 23; ++x) disturbed.pixels[static_cast<std::size_t>(32 * y + x)] = 255;
     EXPECT_NEAR(edge_slope(disturbed.view(), Side::kBelow, blob()), dark, 0.06);
+}
+
+TEST(EdgeSlope, ShadeOnOneSideIsNoSoftEdge) {
+    const double lit = edge_slope(ramp(2.0, 40, 140).view(), Side::kBelow, blob());
+    // The plane of the surroundings is that of the lit skin; the marker lies in the shade.
+    EXPECT_NEAR(edge_slope(ramp(2.0, 40, 100).view(), Side::kBelow, blob()), lit, 0.06);
 }
 
 TEST(EdgeSlope, NoShapeHasNoEdgeAndTheBorderIsNotCrossed) {

@@ -5,25 +5,17 @@
 #include <cmath>
 #include <memory>
 
+#include "tests/support/dot_scene/tilted_ellipse.hpp"
+
 namespace {
 
 using namespace rig;
+using test::TiltedEllipse;
 
-struct Ellipse {
-    double x = 24.3;
-    double y = 22.8;
-    double a = 8.0;  // semi-axes along a direction, px
-    double b = 5.0;
-    double angle = 0.5;
-    [[nodiscard]] bool holds(double px, double py) const {
-        const double u = (std::cos(angle) * (px - x) + std::sin(angle) * (py - y)) / a;
-        const double v = (std::cos(angle) * (py - y) - std::sin(angle) * (px - x)) / b;
-        return u * u + v * v <= 1.0;
-    }
-};
+constexpr TiltedEllipse kEllipse{24.3, 22.8, 8.0, 5.0, 0.5};
 
 // Moments of the ellipse's pixels that are not hidden, by 8 x 8 samples a pixel.
-SoftMoments moments_without(const Ellipse& e, const BitRows& hidden) {
+SoftMoments moments_without(const TiltedEllipse& e, const BitRows& hidden) {
     double w = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
     for (int py = 0; py < 48; ++py) {
         for (int px = 0; px < 48; ++px) {
@@ -48,7 +40,7 @@ BitRows box(int left, int top, int right, int bottom) {
 }
 
 TEST(HiddenPart, AHiddenCornerIsCompletedToTheWholeEllipse) {
-    const Ellipse e;
+    const TiltedEllipse e = kEllipse;
     const SoftMoments whole = moments_without(e, {});
     for (const BitRows& hidden : {box(22, 18, 26, 22), box(28, 24, 34, 32), box(14, 14, 21, 21)}) {
         const SoftMoments seen = moments_without(e, hidden);
@@ -62,7 +54,7 @@ TEST(HiddenPart, AHiddenCornerIsCompletedToTheWholeEllipse) {
 }
 
 TEST(HiddenPart, AKnownEllipseFillsWhatIsHidden) {
-    const Ellipse e;
+    const TiltedEllipse e = kEllipse;
     const SoftMoments whole = moments_without(e, {});
     const BitRows hidden = box(16, 20, 26, 26);
     const SoftMoments filled = fill_moments(moments_without(e, hidden), whole, hidden, 48);

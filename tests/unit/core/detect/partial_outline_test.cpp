@@ -4,29 +4,18 @@
 
 #include <cmath>
 #include <memory>
-#include <numbers>
+
+#include "tests/support/dot_scene/tilted_ellipse.hpp"
 
 namespace {
 
 using namespace rig;
+using test::TiltedEllipse;
 
 constexpr int kHalf = 128;
 constexpr int kSide = 48;
 
-struct Shape {
-    double x = 0.0;
-    double y = 0.0;
-    double a = 0.0;  // semi-axes along a direction, px
-    double b = 0.0;
-    double angle = 0.0;
-    [[nodiscard]] bool holds(double px, double py) const {
-        const double u = (std::cos(angle) * (px - x) + std::sin(angle) * (py - y)) / a;
-        const double v = (std::cos(angle) * (py - y) - std::sin(angle) * (px - x)) / b;
-        return u * u + v * v <= 1.0;
-    }
-};
-
-constexpr Shape kMarker{24.3, 22.8, 6.0, 4.0, 0.5};
+constexpr TiltedEllipse kMarker{24.3, 22.8, 6.0, 4.0, 0.5};
 
 class PartialOutline : public testing::Test {
   protected:
@@ -62,7 +51,7 @@ class PartialOutline : public testing::Test {
 
 TEST_F(PartialOutline, AWholeOutlineIsFollowedAllAround) {
     draw([](double x, double y) { return kMarker.holds(x, y); });
-    ASSERT_TRUE(follow_ellipse(*w, kHalf, ellipse));
+    ASSERT_TRUE(follow_ellipse(*w, kHalf, {}, ellipse));
     expect_marker(0.05, 0.15);
     EXPECT_EQ(ellipse.followed, 1.0);
     const BitRows before = w->blob;
@@ -72,13 +61,13 @@ TEST_F(PartialOutline, AWholeOutlineIsFollowedAllAround) {
 }
 
 TEST_F(PartialOutline, BitesCutsAndBumpsAreSeenPast) {
-    constexpr Shape kBite{27.5, 25.5, 2.5, 2.0, 0.0};
-    constexpr Shape kCut{24.3, 22.8, 9.0, 0.9, 1.9};  // across, through the middle
-    constexpr Shape kBump{18.6, 26.0, 2.6, 2.6, 0.0};
+    constexpr TiltedEllipse kBite{27.5, 25.5, 2.5, 2.0, 0.0};
+    constexpr TiltedEllipse kCut{24.3, 22.8, 9.0, 0.9, 1.9};  // across, through the middle
+    constexpr TiltedEllipse kBump{18.6, 26.0, 2.6, 2.6, 0.0};
     const auto check = [&](auto inside, double centre_px) {
         w->hidden.fill(0);
         draw(inside);
-        ASSERT_TRUE(follow_ellipse(*w, kHalf, ellipse));
+        ASSERT_TRUE(follow_ellipse(*w, kHalf, {}, ellipse));
         expect_marker(centre_px, 0.6);
         ASSERT_TRUE(keep_ellipse(ellipse, *w));
         EXPECT_GT(count_bits(w->hidden, 0, kSide), 8);
@@ -86,13 +75,14 @@ TEST_F(PartialOutline, BitesCutsAndBumpsAreSeenPast) {
     check([&](double x, double y) { return kMarker.holds(x, y) && !kBite.holds(x, y); }, 0.2);
     check([&](double x, double y) { return kMarker.holds(x, y) && !kCut.holds(x, y); }, 0.2);
     check([&](double x, double y) { return kMarker.holds(x, y) || kBump.holds(x, y); }, 0.3);
+    EXPECT_FALSE(follow_ellipse(*w, kHalf, {.longest_px = 10.0}, ellipse));
 }
 
 TEST_F(PartialOutline, NothingAndLinesAreNoEllipse) {
     draw([](double, double) { return false; });
-    EXPECT_FALSE(follow_ellipse(*w, kHalf, ellipse));
+    EXPECT_FALSE(follow_ellipse(*w, kHalf, {}, ellipse));
     draw([](double x, double y) { return std::abs(y - 20.0 - 0.002 * (x - 24.0) * (x - 24.0)) < 1.5; });
-    EXPECT_FALSE(follow_ellipse(*w, kHalf, ellipse) && ellipse.xx < 100.0);
+    EXPECT_FALSE(follow_ellipse(*w, kHalf, {}, ellipse) && ellipse.xx < 100.0);
 }
 
 TEST_F(PartialOutline, AnEmptyRingIsNotKept) {
@@ -100,7 +90,7 @@ TEST_F(PartialOutline, AnEmptyRingIsNotKept) {
         const double radius = std::hypot(x - 24.0, y - 24.0);
         return radius < 8.0 && radius > 6.5;
     });
-    ASSERT_TRUE(follow_ellipse(*w, kHalf, ellipse));
+    ASSERT_TRUE(follow_ellipse(*w, kHalf, {}, ellipse));
     EXPECT_FALSE(keep_ellipse(ellipse, *w));
 }
 

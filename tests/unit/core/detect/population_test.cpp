@@ -75,7 +75,7 @@ TEST(Population, MarkersLikeTheOthersCostNothing) {
 TEST(Population, SizeAndDepthCost) {
     EXPECT_GT(oddness_of(marker(15.0, 12.0, 0.8)), 1.0);
     EXPECT_GT(oddness_of(marker(6.0, 5.0, 0.8)), 1.0);
-    EXPECT_GT(oddness_of(marker(10.0, 8.5, 0.3)), 1.0);
+    EXPECT_GT(oddness_of(marker(10.0, 8.5, 0.15)), 1.0);
     EXPECT_GT(oddness_of(marker(10.0, 8.5, 0.97)), 0.5);  // darker than ink: a hole
     EXPECT_LT(oddness_of(marker(10.0, 8.5, 0.97), Side::kAbove), 0.01);
     EXPECT_LT(oddness_of(marker(10.0, 8.5, 0.55), Side::kAbove),
@@ -93,7 +93,7 @@ TEST(Population, AnEdgeThatFadesIsAHole) {
     hole.slope = 0.55;
     EXPECT_GT(oddness(population, {}, Side::kBelow, hole), before + 1.0);
     EXPECT_EQ(oddness(population, {}, Side::kAbove, hole), oddness(population, {}, Side::kAbove, blobs[10]));
-    hole.snr = 4.0;  // as far off as noise may take it
+    hole.snr = 3.5;  // as far off as noise may take it
     EXPECT_LT(oddness(population, {}, Side::kBelow, hole), before + 0.1);
     hole.snr = 50.0;
     hole.hidden = true;  // what lies on it has edges of its own

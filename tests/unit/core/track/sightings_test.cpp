@@ -51,6 +51,21 @@ TEST(Sightings, SlotsBeyondSixteenBitsAreLeftOut) {
     EXPECT_EQ(set->source[0][0], 65'535);
 }
 
+TEST(Sightings, WhatWasCompletedWeighsLess) {
+    test::SyntheticFaceOptions options;
+    options.camera_count = 1;
+    const test::SyntheticFace face(options);
+    const std::vector<Observation> seen{{100.0F, 200.0F, 8.0F, 0.5F, 0.9F, 0.0F},
+                                        {150.0F, 200.0F, 8.0F, 0.5F, 0.9F, 0.6F},
+                                        {200.0F, 200.0F, 8.0F, 0.5F, 0.9F, 0.1F}};
+    auto set = std::make_unique<SightingSet>();
+    add_camera_view(face.pack().cameras[0], seen, 0.2, 210.0, *set);
+    ASSERT_EQ(set->views[0].size(), 3U);
+    const auto& view = set->views[0];
+    EXPECT_NEAR(view[0].information, 9.0 * view[1].information, 1e-5 * view[0].information);
+    EXPECT_EQ(view[0].information, view[2].information);
+}
+
 TEST(Sightings, CameraRaysCarryTheirNoiseInMillimetres) {
     test::SyntheticFaceOptions options;
     options.camera_count = 2;

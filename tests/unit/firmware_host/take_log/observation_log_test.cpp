@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <limits>
 
+#include "core/wire/crc32c.hpp"
 #include "tests/support/random.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -30,8 +32,12 @@ ObservationLogHeader header() {
 std::vector<Observation> dots(std::size_t count, SeededRandom& random) {
     std::vector<Observation> result(count);
     for (Observation& dot : result) {
-        dot = {static_cast<float>(random.uniform(0, 640)), static_cast<float>(random.uniform(0, 480)), 8.0F,
-               0.5F, 0.9F};
+        dot = {static_cast<float>(random.uniform(0, 640)),
+               static_cast<float>(random.uniform(0, 480)),
+               8.0F,
+               0.5F,
+               0.9F,
+               0.3F};
     }
     return result;
 }
@@ -43,6 +49,39 @@ std::string contents(const std::filesystem::path& path) {
 
 ByteSpan bytes_of(const std::string& text) {
     return std::as_bytes(std::span(text));
+}
+
+template <class T>
+T number_at(const std::string& text, std::size_t at) {
+    T value;
+    std::memcpy(&value, text.data() + at, sizeof(T));
+    return value;
+}
+
+// A log of two cameras as it was written before observations had a sigma_px.
+std::string of_second_version(const std::string& text) {
+    std::string result = text.substr(0, kObservationLogHeaderBytes);
+    result[4] = 2;
+    for (std::size_t begin = result.size(); begin < text.size();) {
+        const auto length = number_at<std::uint32_t>(text, begin);
+        std::size_t at = begin + kObservationRecordHeadBytes;
+        std::string record = text.substr(begin, kObservationRecordHeadBytes);
+        for (int camera = 0; camera < 2; ++camera) {
+            const auto count = number_at<std::uint16_t>(text, at);
+            record += text.substr(at, sizeof(count));
+            at += sizeof(count);
+            for (int i = 0; i < count; ++i, at += kObservationBytes) record += text.substr(at, 20);
+        }
+        const std::size_t rest = begin + length - sizeof(std::uint32_t) - at;
+        record += text.substr(at, rest);
+        const auto new_length = static_cast<std::uint32_t>(record.size() + sizeof(std::uint32_t));
+        std::memcpy(record.data(), &new_length, sizeof(new_length));
+        const std::uint32_t sum = crc32c(std::as_bytes(std::span(record)));
+        record.append(reinterpret_cast<const char*>(&sum), sizeof(sum));
+        result += record;
+        begin += length;
+    }
+    return result;
 }
 
 class ObservationLogTest : public testing::Test {
@@ -114,6 +153,24 @@ TEST_F(ObservationLogTest, WhatIsWrittenIsRead) {
         for (std::size_t k = 0; k < left_[i].size(); ++k) {
             EXPECT_EQ(tick->cameras[0][k].x_px, left_[i][k].x_px);
             EXPECT_EQ(tick->cameras[0][k].score, left_[i][k].score);
+            EXPECT_EQ(tick->cameras[0][k].sigma_px, left_[i][k].sigma_px);
+        }
+    }
+    EXPECT_TRUE(reader->at_end());
+}
+
+TEST_F(ObservationLogTest, TheSecondVersionIsRead) {
+    write(4);
+    const std::string text = of_second_version(contents(path_));
+    auto reader = ObservationLogReader::open(bytes_of(text));
+    ASSERT_TRUE(reader.has_value());
+    for (std::size_t i = 0; i < 4; ++i) {
+        const auto tick = reader->next();
+        ASSERT_TRUE(tick.has_value());
+        ASSERT_EQ(tick->cameras[0].size(), left_[i].size());
+        for (std::size_t k = 0; k < left_[i].size(); ++k) {
+            EXPECT_EQ(tick->cameras[0][k].score, left_[i][k].score);
+            EXPECT_EQ(tick->cameras[0][k].sigma_px, 0.0F);
         }
     }
     EXPECT_TRUE(reader->at_end());
@@ -122,7 +179,7 @@ TEST_F(ObservationLogTest, WhatIsWrittenIsRead) {
 // Version 1 ended its header at byte 64 and knew One Euro only.
 TEST_F(ObservationLogTest, TheFirstVersionIsRead) {
     write(4);
-    std::string text = contents(path_);
+    std::string text = of_second_version(contents(path_));
     text.erase(64, kMaxShapes);
     text[4] = 1;
     text[48] = 0;
@@ -192,7 +249,7 @@ TEST_F(ObservationLogTest, OtherFilesAreRefused) {
         return ObservationLogReader::open(bytes_of(text)).has_value();
     };
     EXPECT_FALSE(with(0, 'X'));
-    EXPECT_FALSE(with(4, 3));  // version
+    EXPECT_FALSE(with(4, 4));  // version
     EXPECT_FALSE(with(6, 0));  // cameras
     EXPECT_FALSE(with(6, 5));
     EXPECT_FALSE(with(7, 1));     // reserved
