@@ -35,6 +35,17 @@ bool is_inside_picture(const CameraModel& camera, const Vec3& at_mm) {
            seen.pixel[1] <= camera.height_px - 1 - kBorderPx;
 }
 
+// In the picture of a camera that sees anything; a cloud has no border.
+bool is_in_a_picture(const WatchedFrame& frame, std::size_t k) {
+    if (!frame.sightings.from_cameras) return true;
+    for (std::size_t view = 0; view < frame.sightings.view_count; ++view) {
+        if (!frame.sightings.views[view].empty() &&
+            is_inside_picture(frame.sightings.cameras[view], frame.expected_mm[k]))
+            return true;
+    }
+    return false;
+}
+
 bool faces_a_view(const Topology& topology, double least_cosine, const WatchedFrame& frame, std::size_t k) {
     if (!frame.sightings.from_cameras) return true;
     const Vec3 normal = frame.fit.pose.rotation * topology.normal[k];
@@ -134,11 +145,17 @@ void watch_astray(const MarkerWatchConfig& config, const WatchedFrame& frame,
 void watch_unseen(const Topology& topology, const MarkerWatchConfig& config, const WatchedFrame& frame,
                   std::span<const Vec3> neutral_offset_mm, std::size_t k, std::span<Vec3> bias_mm,
                   MarkerWatchState& state) {
-    if (!has_seen_neighbours(topology, frame, k) || !faces_a_view(topology, config.facing_cosine, frame, k))
+    if (!has_seen_neighbours(topology, frame, k) || !is_in_a_picture(frame, k)) {
+        if (state.astray_ticks[k] > 0) --state.astray_ticks[k];
         return;
-    state.absent_ticks[k] = one_more(state.absent_ticks[k]);
-    if (state.absent_ticks[k] >= ticks_of(config.fallen_s, config.rate_hz))
-        state.trouble[k] = MarkerTrouble::kFallen;
+    }
+    // A marker turned away from every camera may be hidden for long; one that is seen beside its place is
+    // not.
+    if (faces_a_view(topology, config.facing_cosine, frame, k)) {
+        state.absent_ticks[k] = one_more(state.absent_ticks[k]);
+        if (state.absent_ticks[k] >= ticks_of(config.fallen_s, config.rate_hz))
+            state.trouble[k] = MarkerTrouble::kFallen;
+    }
     watch_astray(config, frame, neutral_offset_mm, k, bias_mm, state);
 }
 
