@@ -35,6 +35,17 @@ bool is_inside_picture(const CameraModel& camera, const Vec3& at_mm) {
            seen.pixel[1] <= camera.height_px - 1 - kBorderPx;
 }
 
+// In the picture of a camera that sees anything; a cloud has no border.
+bool is_in_a_picture(const WatchedFrame& frame, std::size_t k) {
+    if (!frame.sightings.from_cameras) return true;
+    for (std::size_t view = 0; view < frame.sightings.view_count; ++view) {
+        if (!frame.sightings.views[view].empty() &&
+            is_inside_picture(frame.sightings.cameras[view], frame.expected_mm[k]))
+            return true;
+    }
+    return false;
+}
+
 bool faces_a_view(const Topology& topology, double least_cosine, const WatchedFrame& frame, std::size_t k) {
     if (!frame.sightings.from_cameras) return true;
     const Vec3 normal = frame.fit.pose.rotation * topology.normal[k];
@@ -51,15 +62,20 @@ bool faces_a_view(const Topology& topology, double least_cosine, const WatchedFr
     return false;
 }
 
-bool should_be_seen(const Topology& topology, double least_cosine, const WatchedFrame& frame, std::size_t k) {
+bool has_seen_neighbours(const Topology& topology, const WatchedFrame& frame, std::size_t k) {
     std::size_t seen = 0;
     for (const std::uint16_t neighbour : topology.nearest[k])
         seen += frame.named.markers[neighbour].seen ? 1U : 0U;
-    return seen >= kSeenNeighbours && faces_a_view(topology, least_cosine, frame, k);
+    return seen >= kSeenNeighbours;
 }
 
+struct AstraySighting {
+    Triangulation point;
+    bool depth_measured = false;  // by two views, or a cloud
+};
+
 // What stands near an unseen marker's place without a name, in every view; false: nothing.
-bool find_astray(double reach_mm, const WatchedFrame& frame, std::size_t k, Vec3& position_mm) {
+bool find_astray(double reach_mm, const WatchedFrame& frame, std::size_t k, AstraySighting& astray) {
     MarkerSightings mine;
     for (std::size_t view = 0; view < frame.sightings.view_count; ++view) {
         const ViewSightings& seen = frame.sightings.views[view];
@@ -76,29 +92,33 @@ bool find_astray(double reach_mm, const WatchedFrame& frame, std::size_t k, Vec3
         RIG_CHECK(kept);
     }
     if (mine.empty()) return false;
-    const Triangulation point = triangulate(mine.span(), frame.expected_mm[k], kDepthInformation);
-    position_mm = point.position_mm;
-    return point.gap_mm <= kSamePlaceMm;
+    astray.point = triangulate(mine.span(), frame.expected_mm[k], kDepthInformation);
+    astray.depth_measured = mine.size() > 1 || !frame.sightings.from_cameras;
+    return astray.point.gap_mm <= kSamePlaceMm;
 }
 
-// Whether a sighting that has kept its place beside a marker is the marker: it moves with the face.
-bool is_marker_astray(const MarkerWatchConfig& config, std::size_t k, const MarkerWatchState& state) {
+// Whether a sighting that has kept its place beside a marker is the marker: it moves with the face. Of one
+// ray a face at rest says nothing: motion along it would not show.
+bool is_marker_astray(const MarkerWatchConfig& config, bool depth_measured, std::size_t k,
+                      const MarkerWatchState& state) {
     const std::uint16_t enough = ticks_of(config.astray_s, config.rate_hz);
     if (state.astray_ticks[k] < enough) return false;
     if (state.astray_steps_mm2[k] >= config.astray_steps_mm2) return true;
-    return state.astray_ticks[k] >= kAtRest * enough && state.astray_steps_mm2[k] > -config.astray_steps_mm2;
+    return depth_measured && state.astray_ticks[k] >= kAtRest * enough &&
+           state.astray_steps_mm2[k] > -config.astray_steps_mm2;
 }
 
 // A marker that should be seen and is not may be the sighting beside its place that has no name.
 void watch_astray(const MarkerWatchConfig& config, const WatchedFrame& frame,
                   std::span<const Vec3> neutral_offset_mm, std::size_t k, std::span<Vec3> bias_mm,
                   MarkerWatchState& state) {
-    Vec3 position_mm = Vec3::Zero();
+    AstraySighting astray;
     std::uint16_t& ticks = state.astray_ticks[k];
-    if (!find_astray(config.astray_mm, frame, k, position_mm)) {
+    if (!find_astray(config.astray_mm, frame, k, astray)) {
         if (ticks > 0) --ticks;
         return;
     }
+    const Vec3& position_mm = astray.point.position_mm;
     const Vec3 off_mm = frame.fit.pose.rotation.transpose() * (position_mm - frame.expected_mm[k]);
     const Vec3 step_mm = off_mm - state.astray_mm[k];
     if (ticks == 0 || step_mm.squaredNorm() > kSamePlaceMm * kSamePlaceMm) {
@@ -109,11 +129,14 @@ void watch_astray(const MarkerWatchConfig& config, const WatchedFrame& frame,
         return;
     }
     const Vec3 moved_mm = position_mm - state.astray_place_mm[k];
-    state.astray_steps_mm2[k] += moved_mm.squaredNorm() - step_mm.squaredNorm();
+    // The depth of a single ray is that of the expected place, and so moves with the face.
+    const double moved = measured_length_mm(astray.point.information, moved_mm);
+    const double step = measured_length_mm(astray.point.information, frame.fit.pose.rotation * step_mm);
+    state.astray_steps_mm2[k] += moved * moved - step * step;
     state.astray_mm[k] += kAstrayLearning * step_mm;
     state.astray_place_mm[k] += kAstrayLearning * moved_mm;
     ticks = one_more(ticks);
-    if (!is_marker_astray(config, k, state)) return;
+    if (!is_marker_astray(config, astray.depth_measured, k, state)) return;
     ticks = 0;
     const Vec3 bias = bias_mm[k] + frame.fit.pose.rotation * state.astray_mm[k];
     if (off_its_place_mm(frame.fit.pose, neutral_offset_mm, bias, k) <= config.astray_mm) bias_mm[k] = bias;
@@ -122,10 +145,17 @@ void watch_astray(const MarkerWatchConfig& config, const WatchedFrame& frame,
 void watch_unseen(const Topology& topology, const MarkerWatchConfig& config, const WatchedFrame& frame,
                   std::span<const Vec3> neutral_offset_mm, std::size_t k, std::span<Vec3> bias_mm,
                   MarkerWatchState& state) {
-    if (!should_be_seen(topology, config.facing_cosine, frame, k)) return;
-    state.absent_ticks[k] = one_more(state.absent_ticks[k]);
-    if (state.absent_ticks[k] >= ticks_of(config.fallen_s, config.rate_hz))
-        state.trouble[k] = MarkerTrouble::kFallen;
+    if (!has_seen_neighbours(topology, frame, k) || !is_in_a_picture(frame, k)) {
+        if (state.astray_ticks[k] > 0) --state.astray_ticks[k];
+        return;
+    }
+    // A marker turned away from every camera may be hidden for long; one that is seen beside its place is
+    // not.
+    if (faces_a_view(topology, config.facing_cosine, frame, k)) {
+        state.absent_ticks[k] = one_more(state.absent_ticks[k]);
+        if (state.absent_ticks[k] >= ticks_of(config.fallen_s, config.rate_hz))
+            state.trouble[k] = MarkerTrouble::kFallen;
+    }
     watch_astray(config, frame, neutral_offset_mm, k, bias_mm, state);
 }
 
@@ -176,7 +206,10 @@ void count_all_off(const ShapeModel& model, const MarkerWatchConfig& config, con
     const bool stands_out = most_mm > config.slid_alone_mm && most_mm >= config.alone_ratio * next_mm;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         if (!frame.named.markers[k].seen) continue;
-        count_off(off_mm[k] > config.slid_mm || (k == farthest && stands_out), config, k, state);
+        // A flag that the lesser limit raised is not cleared by the greater one.
+        const double limit_mm =
+            state.trouble[k] == MarkerTrouble::kSlid ? config.slid_alone_mm : config.slid_mm;
+        count_off(off_mm[k] > limit_mm || (k == farthest && stands_out), config, k, state);
     }
 }
 

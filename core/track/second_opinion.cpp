@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/bounded_vector.hpp"
+#include "core/base/check.hpp"
 
 namespace rig {
 
@@ -22,6 +23,8 @@ constexpr double kBesideMm = 15.0;  // from a marker to a sighting that may be i
 constexpr std::uint8_t kSuspicious = 8;
 constexpr std::uint16_t kFirstPause = 8;  // frames; doubled up to the longest
 constexpr std::uint16_t kLongestPause = 960;
+// Frames, besides twice the pause that would have followed: the next opinion is asked for before that.
+constexpr int kTakenLately = 60;
 constexpr double kLeastGainMm2 = 0.5 * kNamingGateMm * kNamingGateMm;
 constexpr double kMostShare = 0.9;   // of what the present names leave
 constexpr double kRivalMm = 6.0;     // from a sighting to the face's place of an unseen marker
@@ -60,7 +63,7 @@ struct Rival {
     std::size_t named = 0;
     std::size_t unseen = 0;
 };
-using Rivals = BoundedVector<Rival, 4 * kOpinions>;  // more are left for another frame
+using Rivals = BoundedVector<Rival, kMostRivals>;
 
 bool is_seen(const SightingSet& sightings, const Matches& matches, std::size_t marker, std::size_t but_view) {
     for (std::size_t view = 0; view < sightings.view_count; ++view)
@@ -68,33 +71,50 @@ bool is_seen(const SightingSet& sightings, const Matches& matches, std::size_t m
     return false;
 }
 
-// predicted_mm: of the face that was fitted to the names.
-void find_rivals(const ShapeModel& model, const SightingSet& sightings, const Matches& matches,
-                 std::span<const Vec3> predicted_mm, Rivals& rivals) {
-    rivals.clear();
+// Calls visit(rival) for each, in the order of the unseen markers. predicted_mm: of the face that was fitted
+// to the names.
+template <typename Visit>
+void for_each_rival(const ShapeModel& model, const SightingSet& sightings, const Matches& matches,
+                    std::span<const bool> off_place, std::span<const Vec3> predicted_mm, const Visit& visit) {
     for (std::size_t j = 0; j < model.marker_count; ++j) {
         if (is_seen(sightings, matches, j, kMaxCameras)) continue;
         for (std::size_t view = 0; view < sightings.view_count; ++view) {
             for (std::size_t k = 0; k < model.marker_count; ++k) {
-                if (matches[view][k] < 0) continue;
+                if (matches[view][k] < 0 || (!off_place.empty() && off_place[k])) continue;
                 const Sighting& seen = sightings.views[view][static_cast<std::size_t>(matches[view][k])];
                 if (seen.squared_distance_mm2(predicted_mm[j]) > kRivalMm * kRivalMm ||
                     seen.squared_distance_mm2(predicted_mm[k]) < kLeastOffMm * kLeastOffMm ||
                     is_seen(sightings, matches, k, view))
                     continue;
-                if (!rivals.push_back({view, k, j})) return;
+                visit(Rival{view, k, j});
             }
         }
     }
 }
 
+// Those that one opinion looks at. Each begins at its own share of all, so that many rivals at the first
+// markers do not keep the last ones from being heard.
+void find_rivals(const ShapeModel& model, const SightingSet& sightings, const Matches& matches,
+                 std::span<const bool> off_place, std::span<const Vec3> predicted_mm, std::uint8_t opinion,
+                 Rivals& rivals) {
+    std::size_t count = 0;
+    for_each_rival(model, sightings, matches, off_place, predicted_mm, [&](const Rival&) { ++count; });
+    rivals.clear();
+    const std::size_t first = opinion * count / kOpinions;
+    std::size_t at = 0;
+    for_each_rival(model, sightings, matches, off_place, predicted_mm, [&](const Rival& rival) {
+        const std::size_t after_first = (at++ + count - first) % count;
+        if (after_first >= kMostRivals) return;
+        const bool kept = rivals.push_back(rival);
+        RIG_CHECK(kept);
+    });
+}
+
 // True: one of the rivals has a better claim, the face's objective is less than `wanted`; the names and the
 // face are then in the workspace.
 bool hear_rivals(const ShapeModel& model, const ShapeFit& fit, const SightingSet& sightings,
-                 const Matches& matches, std::uint8_t opinion, const Rivals& rivals, double wanted,
-                 NamingWorkspace& w) {
-    for (std::size_t i = 0; i < std::min(rivals.size(), kMostRivals); ++i) {
-        const Rival& rival = rivals[(opinion * kMostRivals + i) % rivals.size()];
+                 const Matches& matches, const Rivals& rivals, double wanted, NamingWorkspace& w) {
+    for (const Rival& rival : rivals) {
         Matches other = matches;
         std::swap(other[rival.view][rival.named], other[rival.view][rival.unseen]);
         fit_to_names(model, kReach, fit, sightings, other, w);
@@ -112,13 +132,17 @@ void ask_for_opinions(SecondOpinionState& state) {
 
 void take_opinion(SecondOpinionState& state) {
     state.suspicion = 0;
-    state.pause = 0;
-    state.next_pause = 0;
+    if (state.taken_lately == 0) {
+        state.pause = 0;
+        state.next_pause = 0;
+    }
+    state.taken_lately = static_cast<std::uint16_t>(kTakenLately + 2 * state.next_pause);
 }
 
 void suspect(const ShapeModel& model, std::span<const Vec3> predicted_mm, const SightingSet& sightings,
              const Matches& matches, const LeftOverSightings& left_over, bool odd,
              SecondOpinionState& state) {
+    if (state.taken_lately > 0) --state.taken_lately;
     if (state.pause > 0) {
         --state.pause;
         return;
@@ -142,12 +166,14 @@ void suspect(const ShapeModel& model, std::span<const Vec3> predicted_mm, const 
 }
 
 bool second_opinion(const ShapeModel& model, const ShapeFit& fit, const SightingSet& sightings,
-                    const Matches& matches, std::uint8_t opinion, NamingWorkspace& w) {
+                    const Matches& matches, std::span<const bool> off_place, std::uint8_t opinion,
+                    NamingWorkspace& w) {
     fit_to_names(model, kReach, fit, sightings, matches, w);
     const double present_mm2 = naming_cost_mm2(model, sightings, matches, w);
     const double wanted = w.trial.objective - kRivalGain;
     Rivals rivals;
-    find_rivals(model, sightings, matches, {w.predicted_mm.data(), model.marker_count}, rivals);
+    find_rivals(model, sightings, matches, off_place, {w.predicted_mm.data(), model.marker_count}, opinion,
+                rivals);
     take_leading_modes(model, w.coarse);
     ShapeFit start = start_of(w.coarse, fit, opinion);
     approach(kReach, sightings, w, start);
@@ -156,7 +182,7 @@ bool second_opinion(const ShapeModel& model, const ShapeFit& fit, const Sighting
         const double other_mm2 = naming_cost_mm2(model, sightings, w.matches, w);
         if (other_mm2 + kLeastGainMm2 < present_mm2 && other_mm2 < kMostShare * present_mm2) return true;
     }
-    return hear_rivals(model, fit, sightings, matches, opinion, rivals, wanted, w);
+    return hear_rivals(model, fit, sightings, matches, rivals, wanted, w);
 }
 
 }  // namespace rig

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "core/track/naming_rounds.hpp"
 
@@ -20,12 +21,14 @@ struct SecondOpinionState {
     std::uint8_t suspicion = 0;  // frames that looked wrong, less those that did not
     std::uint16_t pause = 0;     // frames until suspicion counts again
     std::uint16_t next_pause = 0;
+    std::uint16_t taken_lately = 0;  // frames in which another opinion that is taken leaves the pauses alone
 };
 
 // Every opinion is asked for in the frames that follow.
 void ask_for_opinions(SecondOpinionState& state);
 
-// One was better: suspicion was right, and is listened to as at first.
+// One was better: suspicion was right, and is listened to as at first. Not when one was taken a moment
+// before: two namings that a ghost makes equally good would take turns for ever.
 void take_opinion(SecondOpinionState& state);
 
 // Of one frame and its final names. `odd`: something else about the names is wrong. Suspicion that lasts asks
@@ -38,8 +41,11 @@ void suspect(const ShapeModel& model, std::span<const Vec3> predicted_mm, const 
 // workspace.matches, its face in workspace.trial. Failing that, each opinion looks at a few rivals: a marker
 // that none was found for, beside a sighting that only one view gives to another marker. A camera sees along
 // its ray no farther than the first of them, and the wrong one of both bends the face; so the rival has the
-// name when the face then fits clearly better. Work is bounded: five coarse and eleven whole fits.
+// name when the face then fits clearly better. `off_place` [marker_count] or empty: markers known to stand
+// off their place on the face, whose sightings nobody else claims. Work is bounded: five coarse and eleven
+// whole fits.
 [[nodiscard]] bool second_opinion(const ShapeModel& model, const ShapeFit& fit, const SightingSet& sightings,
-                                  const Matches& matches, std::uint8_t opinion, NamingWorkspace& workspace);
+                                  const Matches& matches, std::span<const bool> off_place,
+                                  std::uint8_t opinion, NamingWorkspace& workspace);
 
 }  // namespace rig

@@ -16,6 +16,7 @@ constexpr double kBiasLearning =
     0.02;  // per frame: follows a head the model does not quite fit within a second
 // Names need the face to a tenth of a millimetre; its fitted markers' own deviation is half of that.
 constexpr ShapeFitLimits kFitLimits{6, 0.3};
+constexpr double kOffPlaceMm = 1.0;  // beyond what a face that the model does not quite fit makes usual
 constexpr int kReturnWindow = 3;  // frames in which one who came back a little off has to be seen once more
 constexpr int kMostReturnFrames = 31;
 
@@ -251,13 +252,27 @@ void name_sightings(const ShapeModel& model, const TrackerConfig& config, const 
     }
 }
 
+// Markers that are known to stand off their place: that the face does not explain where they are is no reason
+// to take their sightings for others.
+void mark_off_place(const ShapeModel& model, const TrackerConfig& config, const TrackerState& state,
+                    TrackerWorkspace& w) {
+    for (std::size_t k = 0; k < model.marker_count; ++k) {
+        w.off_place[k] =
+            state.watch.trouble[k] == MarkerTrouble::kSlid ||
+            off_its_place_mm(state.fit.pose, config.neutral_offset_mm, state.bias_mm[k], k) > kOffPlaceMm;
+    }
+}
+
 // One opinion. When it is better the face starts from it, and markers that it names otherwise from nothing;
 // the others keep what is known of them.
 void hear_opinion(const ShapeModel& model, const TrackerConfig& config, const SightingSet& sightings,
                   TrackerState& state, TrackerWorkspace& w, NamedMarkers& named, TrackerReport& report) {
     const auto opinion = static_cast<std::uint8_t>(kOpinions - state.opinion.left--);
     NamingWorkspace& other = w.bootstrap.naming;
-    if (!second_opinion(model, w.next, sightings, w.matches, opinion, other)) return;
+    mark_off_place(model, config, state, w);
+    if (!second_opinion(model, w.next, sightings, w.matches, {w.off_place.data(), model.marker_count},
+                        opinion, other))
+        return;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         bool changed = false;
         for (std::size_t view = 0; view < sightings.view_count; ++view)

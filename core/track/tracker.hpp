@@ -76,8 +76,9 @@ struct TrackerWorkspace {
     std::array<Vec3, kMaxMarkers> before_mm{};  // in the last frame, when this one's names were reconsidered
     std::array<Vec3, kMaxMarkers> positions_mm{};
     std::array<Mat3, kMaxMarkers> informations{};
-    std::array<bool, kMaxMarkers> broken{};  // order among neighbours
-    LeftOverSightings left_over;             // of the final names
+    std::array<bool, kMaxMarkers> broken{};     // order among neighbours
+    std::array<bool, kMaxMarkers> off_place{};  // known to be, when opinions were heard last
+    LeftOverSightings left_over;                // of the final names
 };
 
 struct TrackerReport {

@@ -316,6 +316,28 @@ TEST(Tracker, DarkFramesSpendNoSecondOpinion) {
     EXPECT_EQ(s.state->opinion.left, left - 1);
 }
 
+// A dot that stands 5 mm beside the place of a marker that came off, and two namings that are equally good
+// then.
+TEST(Tracker, NamingsThatTakeTurnsBesideAGhostComeToRest) {
+    for (const std::size_t marker : {0U, 24U, 48U}) {
+        Scene s;
+        Vec3 ghost = Vec3::Zero();
+        int reconsidered = 0;
+        for (int frame = 0; frame < 900; ++frame) {
+            const double time_s = frame / 60.0;
+            std::vector<Vec3> points =
+                test::moved(test::creeping_slip(time_s), s.face.positions(s.face.weights_at(time_s)));
+            if (frame == 100)
+                ghost = points[marker] + 5.0 * s.face.outward(marker).cross(Vec3{0.3, 1.0, 0.2}).normalized();
+            if (frame >= 100) points[marker] = ghost;
+            test::add_noise(points, 0.1, s.random);
+            s.track_cloud(points);
+            reconsidered += frame >= 120 && s.report->reconsidered > 0 ? 1 : 0;
+        }
+        EXPECT_LE(reconsidered, 40) << marker;
+    }
+}
+
 class TrackerFromCameras : public testing::TestWithParam<std::size_t> {};
 
 TEST_P(TrackerFromCameras, NamesStayRightOverThreeHundredFrames) {
