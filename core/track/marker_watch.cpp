@@ -206,10 +206,12 @@ void count_all_off(const ShapeModel& model, const MarkerWatchConfig& config, con
     const bool stands_out = most_mm > config.slid_alone_mm && most_mm >= config.alone_ratio * next_mm;
     for (std::size_t k = 0; k < model.marker_count; ++k) {
         if (!frame.named.markers[k].seen) continue;
-        // A flag that the lesser limit raised is not cleared by the greater one.
-        const double limit_mm =
-            state.trouble[k] == MarkerTrouble::kSlid ? config.slid_alone_mm : config.slid_mm;
-        count_off(off_mm[k] > limit_mm || (k == farthest && stands_out), config, k, state);
+        // A flag that the lesser limit raised is not cleared by the greater one while the marker still stands
+        // out; where many stand off, as right after a neutral of dots glued aside, it is.
+        const bool still_out = state.trouble[k] == MarkerTrouble::kSlid && off_mm[k] > config.slid_alone_mm &&
+                               off_mm[k] >= config.alone_ratio * most_mm;
+        const bool off = off_mm[k] > config.slid_mm || still_out || (k == farthest && stands_out);
+        count_off(off, config, k, state);
     }
 }
 
